@@ -1,0 +1,88 @@
+"""Where frames come from: `open_source("bop:PATH:SCENE")` and the two protocols that a source may fulfil."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from tracker.errors import SourceError
+from tracker.frame import Frame
+from tracker.geometry import Pose
+
+
+class FrameSource(Protocol):
+    """Frames in the order of their stamps. `name` says which source it is, as the user wrote it."""
+
+    @property
+    def name(self) -> str: ...
+
+    def __iter__(self) -> Iterator[Frame]: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """What is known of an object in a frame before the frame is read.
+
+    index: position in the source. visible_px: its pixels that can be seen. visible_fraction: share of its silhouette
+    that can be seen, in [0, 1].
+    """
+
+    index: int
+    T_cam_obj: Pose
+    visible_px: int
+    visible_fraction: float
+
+
+@runtime_checkable
+class PosedSource(FrameSource, Protocol):
+    """A recording with known poses: frames by position, and where each object is in them."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int) -> Frame: ...
+
+    @property
+    def object_ids(self) -> tuple[str, ...]: ...
+
+    def sightings(self, object_id: str) -> Sequence[Sighting]: ...
+
+
+def require_object(source: PosedSource, object_id: str) -> None:
+    """Raises SourceError unless the source knows the object; the message lists those that it knows."""
+    if object_id not in source.object_ids:
+        raise SourceError(
+            f"{source.name} has no poses of object {object_id!r}; it has {', '.join(source.object_ids) or 'none'}"
+        )
+
+
+def _bop(argument: str) -> PosedSource:
+    from tracker.sources.bop import BopScene
+
+    path, separator, scene = argument.rpartition(":")
+    if not separator or not scene.isdigit():
+        raise SourceError(f"bop:{argument}: expected bop:PATH:SCENE with the number of a scene")
+    return BopScene(path, int(scene))
+
+
+def _folder(argument: str) -> PosedSource:
+    from tracker.sources.folder import Folder
+
+    return Folder(argument)
+
+
+def _synthetic(argument: str) -> PosedSource:
+    from tracker.sources.synthetic import open_scene
+
+    return open_scene(argument)
+
+
+SOURCES: dict[str, Callable[[str], PosedSource]] = {"bop": _bop, "folder": _folder, "synthetic": _synthetic}
+
+
+def open_source(name: str) -> PosedSource:
+    """`KIND:ARGUMENT` -> the source. Raises SourceError where the kind, the path or its content is not what it needs."""
+    kind, separator, argument = name.partition(":")
+    if kind not in SOURCES or not separator or not argument:
+        raise SourceError(f"{name!r} is not a source; expected KIND:ARGUMENT with KIND one of {', '.join(SOURCES)}")
+    return SOURCES[kind](argument)

@@ -1,0 +1,54 @@
+"""Pictures on disk -> arrays. A half-written file is an error here, not a half-gray picture later."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracker.errors import SourceError
+
+PNG_END = b"IEND\xaeB`\x82"
+JPEG_END = b"\xff\xd9"
+
+
+def read_rgb(path: Path) -> npt.NDArray[np.uint8]:
+    """(H, W, 3) uint8, RGB."""
+    bgr = _decode(path, cv2.IMREAD_COLOR)
+    return np.ascontiguousarray(bgr[:, :, ::-1])
+
+
+def read_depth_m(path: Path, metres_per_unit: float) -> npt.NDArray[np.float32]:
+    """(H, W) float32 metres from a single-channel integer picture, 0 where there is none.
+
+    Raises SourceError if the scale is not positive: some recordings read back 0.
+    """
+    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
+        raise SourceError(f"{path}: the depth scale must be positive, got {metres_per_unit:g} metres per unit")
+    raw = _decode(path, cv2.IMREAD_UNCHANGED)
+    if raw.ndim != 2 or raw.dtype not in (np.uint8, np.uint16):
+        raise SourceError(f"{path}: a depth picture has one channel of 16 bits, got {raw.dtype} {raw.shape}")
+    return raw.astype(np.float32) * np.float32(metres_per_unit)
+
+
+def read_mask(path: Path) -> npt.NDArray[np.bool_]:
+    """(H, W) bool: any value but 0 is the object."""
+    raw = _decode(path, cv2.IMREAD_UNCHANGED)
+    return (raw if raw.ndim == 2 else raw.any(axis=2)) > 0
+
+
+def _decode(path: Path, flag: int) -> npt.NDArray:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
+    # OpenCV returns what it has of a truncated file and only warns, so the end marker is looked for.
+    suffix = path.suffix.lower()
+    if suffix == ".png" and PNG_END not in data[-64:] or suffix in (".jpg", ".jpeg") and JPEG_END not in data[-64:]:
+        raise SourceError(f"{path}: the file is truncated ({len(data)} bytes, no end marker)")
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), flag) if data else None
+    if image is None:
+        raise SourceError(f"{path}: not a picture that can be decoded ({len(data)} bytes)")
+    return image
