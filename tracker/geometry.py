@@ -133,8 +133,8 @@ class Intrinsics:
         # A matrix of half or double resolution has its centre a quarter or a half of the image off.
         if abs(self.cx / self.width - 0.5) > 0.22 or abs(self.cy / self.height - 0.5) > 0.22:
             raise FrameError(
-                f"principal point ({self.cx:.1f}, {self.cy:.1f}) is far from the centre of a {self.width} x {self.height} "
-                "image: does K belong to another resolution?"
+                f"principal point ({self.cx:.1f}, {self.cy:.1f}) is far from the centre of a "
+                f"{self.width} x {self.height} image: does K belong to another resolution?"
             )
 
     @property
@@ -148,4 +148,5 @@ class Intrinsics:
 
     def unproject(self, columns: Floats, rows: Floats, depth_m: Floats) -> Floats:
         """Pixels and their z in metres, each (N,) -> points (N, 3) in camera coordinates."""
-        return np.stack(((columns - self.cx) / self.fx * depth_m, (rows - self.cy) / self.fy * depth_m, depth_m), axis=1)
+        x_m, y_m = (columns - self.cx) / self.fx * depth_m, (rows - self.cy) / self.fy * depth_m
+        return np.stack((x_m, y_m, depth_m), axis=1)

@@ -81,7 +81,7 @@ SOURCES: dict[str, Callable[[str], PosedSource]] = {"bop": _bop, "folder": _fold
 
 
 def open_source(name: str) -> PosedSource:
-    """`KIND:ARGUMENT` -> the source. Raises SourceError where the kind, the path or its content is not what it needs."""
+    """`KIND:ARGUMENT` -> the source. Raises SourceError where kind, path or content is not what it needs."""
     kind, separator, argument = name.partition(":")
     if kind not in SOURCES or not separator or not argument:
         raise SourceError(f"{name!r} is not a source; expected KIND:ARGUMENT with KIND one of {', '.join(SOURCES)}")

@@ -133,7 +133,8 @@ def find_scene(path: Path, scene_id: int) -> Path:
     name = f"{scene_id:06d}"
     if not path.is_dir():
         raise SourceError(f"{path} is not a folder")
-    found = [folder for folder in (path / "test" / name, path / name, *sorted(path.glob(f"*/{name}"))) if folder.is_dir()]
+    candidates = (path / "test" / name, path / name, *sorted(path.glob(f"*/{name}")))
+    found = [folder for folder in candidates if folder.is_dir()]
     if not found:
         raise SourceError(f"{path} has no scene {scene_id}; it has {', '.join(map(str, scene_ids(path))) or 'none'}")
     return found[0]

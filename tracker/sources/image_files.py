@@ -36,7 +36,7 @@ def read_depth_m(path: Path, metres_per_unit: float) -> npt.NDArray[np.float32]:
 def read_mask(path: Path) -> npt.NDArray[np.bool_]:
     """(H, W) bool: any value but 0 is the object."""
     raw = _decode(path, cv2.IMREAD_UNCHANGED)
-    return (raw if raw.ndim == 2 else raw.any(axis=2)) > 0
+    return np.asarray(raw if raw.ndim == 2 else raw.max(axis=2)) > 0
 
 
 def _decode(path: Path, flag: int) -> npt.NDArray:
@@ -45,8 +45,8 @@ def _decode(path: Path, flag: int) -> npt.NDArray:
     except OSError as error:
         raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
     # OpenCV returns what it has of a truncated file and only warns, so the end marker is looked for.
-    suffix = path.suffix.lower()
-    if suffix == ".png" and PNG_END not in data[-64:] or suffix in (".jpg", ".jpeg") and JPEG_END not in data[-64:]:
+    end = {".png": PNG_END, ".jpg": JPEG_END, ".jpeg": JPEG_END}.get(path.suffix.lower(), b"")
+    if end not in data[-64:]:
         raise SourceError(f"{path}: the file is truncated ({len(data)} bytes, no end marker)")
     image = cv2.imdecode(np.frombuffer(data, np.uint8), flag) if data else None
     if image is None:
