@@ -1,0 +1,116 @@
+"""What there is to evaluate on: `open_dataset("bop:PATH")` and the protocol that a dataset fulfils."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from tracker.errors import SourceError
+from tracker.geometry import Floats, Pose
+from tracker.sources import PosedSource
+
+LEAST_VISIBLE_FRACTION = 0.1  # BOP: an instance of which less can be seen is no target
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """An object in an image whose pose is to be estimated.
+
+    index: position of the image in its scene. image_id: its number in the dataset. T_cam_obj: the true pose.
+    visible_px, visible_fraction: what can be seen of the object.
+    """
+
+    index: int
+    image_id: int
+    object_id: str
+    T_cam_obj: Pose
+    visible_px: int
+    visible_fraction: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObjectModel:
+    """The shape that errors are measured on; no tracker sees it.
+
+    points_m: (N, 3) object coordinates. diameter_m: the largest distance between two of its points, as the dataset
+    says. symmetric: whether the dataset declares a symmetry; None where it declares nothing about any object.
+    """
+
+    points_m: Floats
+    diameter_m: float
+    symmetric: bool | None
+
+
+class Dataset(Protocol):
+    """Scenes with known poses, the instances in them that count, and the models to measure with.
+
+    Objects are called by text everywhere but in BOP's result file, which numbers them: `number` and `object_with`.
+    Whatever is asked for that is not there is a SourceError that lists what is.
+    """
+
+    @property
+    def name(self) -> str:
+        """As the user wrote it."""
+        ...
+
+    @property
+    def target_rule(self) -> str:
+        """Which frames and instances are targets, for the protocol of a report."""
+        ...
+
+    @property
+    def model_frame(self) -> str:
+        """Whose object coordinates the poses are in, for the protocol of a report."""
+        ...
+
+    @property
+    def scene_ids(self) -> tuple[int, ...]: ...
+
+    @property
+    def object_ids(self) -> tuple[str, ...]: ...
+
+    def scene(self, scene_id: int) -> PosedSource: ...
+
+    def image_ids(self, scene_id: int) -> Sequence[int]:
+        """Number of every image of the scene, by its position in the source."""
+        ...
+
+    def targets(self, scene_id: int) -> list[Target]:
+        """In the order of images, then of objects."""
+        ...
+
+    def model(self, object_id: str) -> ObjectModel: ...
+
+    def number(self, object_id: str) -> int: ...
+
+    def object_with(self, number: int) -> str: ...
+
+
+def require(kind: str, asked: object, available: Sequence[object], dataset: str) -> None:
+    """Raises SourceError unless the dataset has what was asked for; the message lists what it has."""
+    if asked not in available:
+        raise SourceError(f"{dataset} has no {kind} {asked!r}; it has {', '.join(map(str, available)) or 'none'}")
+
+
+def _bop(argument: str) -> Dataset:
+    from eval.datasets.bop import BopDataset
+
+    return BopDataset(argument)
+
+
+def _synthetic(argument: str) -> Dataset:
+    from eval.datasets.synthetic import open_synthetic
+
+    return open_synthetic(argument)
+
+
+DATASETS: dict[str, Callable[[str], Dataset]] = {"bop": _bop, "synthetic": _synthetic}
+
+
+def open_dataset(name: str) -> Dataset:
+    """`bop:PATH` or `synthetic:NAME[?options]` -> the dataset. Raises SourceError where it cannot be one."""
+    kind, separator, argument = name.partition(":")
+    if kind not in DATASETS or not separator or not argument:
+        raise SourceError(f"{name!r} is not a dataset; expected KIND:ARGUMENT with KIND one of {', '.join(DATASETS)}")
+    return DATASETS[kind](argument)

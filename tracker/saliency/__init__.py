@@ -1,0 +1,90 @@
+"""Where each named concept is in a picture of an object: the protocol, its result, and the table of backends."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracker.errors import ConfigError
+from tracker.view import Box, Float32s, ObjectView
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Saliency:
+    """One map a concept over a part of a frame.
+
+    labels: the L concepts. maps: (L, h, w) float32 in [0, 1]. box: the frame's pixels that the maps cover, at whatever
+    resolution the backend has; it may reach beyond the frame.
+    """
+
+    labels: tuple[str, ...]
+    maps: Float32s
+    box: Box
+
+    def sample(self, columns: npt.NDArray, rows: npt.NDArray) -> Float32s:
+        """Values (N, L) at pixels of the frame, interpolated between the maps' pixels."""
+        height, width = self.maps.shape[1:]
+        x = (columns + 0.5 - self.box.x0) * (width / (self.box.x1 - self.box.x0)) - 0.5
+        y = (rows + 0.5 - self.box.y0) * (height / (self.box.y1 - self.box.y0)) - 0.5
+        x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
+        left, top = np.minimum(x.astype(int), max(width - 2, 0)), np.minimum(y.astype(int), max(height - 2, 0))
+        right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+        a, b = (x - left).astype(np.float32), (y - top).astype(np.float32)
+        upper = self.maps[:, top, left] * (1 - a) + self.maps[:, top, right] * a
+        lower = self.maps[:, bottom, left] * (1 - a) + self.maps[:, bottom, right] * a
+        return np.ascontiguousarray((upper * (1 - b) + lower * b).T)
+
+    def full(self, height: int, width: int) -> Float32s:
+        """(L, height, width) maps over the whole frame, 0 outside the box."""
+        x0, y0, x1, y1 = max(self.box.x0, 0), max(self.box.y0, 0), min(self.box.x1, width), min(self.box.y1, height)
+        out = np.zeros((len(self.labels), height, width), np.float32)
+        size = (self.box.x1 - self.box.x0, self.box.y1 - self.box.y0)
+        for place, concept_map in zip(out, self.maps, strict=True):
+            whole = cv2.resize(concept_map, size, interpolation=cv2.INTER_LINEAR)
+            place[y0:y1, x0:x1] = whole[y0 - self.box.y0 : y1 - self.box.y0, x0 - self.box.x0 : x1 - self.box.x0]
+        return out
+
+
+class SaliencyBackend(Protocol):
+    """Finds concepts in views of objects; several views at once may share a batch.
+
+    name: as in `--backend`. labels: the L concepts that it maps. fingerprint: changes whenever its maps would.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def labels(self) -> tuple[str, ...]: ...
+
+    @property
+    def fingerprint(self) -> str: ...
+
+    def __call__(self, views: Sequence[ObjectView]) -> list[Saliency]: ...
+
+
+def fingerprint_of(name: str, settings: str) -> str:
+    """A short text that differs between backends and between settings of one."""
+    return f"{name}-{hashlib.sha256(settings.encode()).hexdigest()[:12]}"
+
+
+def _attributes() -> SaliencyBackend:
+    from tracker.saliency.attributes import Attributes
+
+    return Attributes()
+
+
+BACKENDS: dict[str, Callable[[], SaliencyBackend]] = {"attributes": _attributes}
+
+
+def open_backend(name: str) -> SaliencyBackend:
+    """The backend of this name. Raises ConfigError that lists those that there are."""
+    if name not in BACKENDS:
+        raise ConfigError(f"there is no saliency backend {name!r}; expected one of {', '.join(BACKENDS)}")
+    return BACKENDS[name]()

@@ -1,0 +1,52 @@
+"""Which frames of a recording become reference frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from reference.viewsphere import farthest_point_sampling, icosphere_directions, nearest_direction
+from tracker.errors import OnboardingError
+from tracker.geometry import Floats
+from tracker.sources import Sighting
+
+SUBDIVISIONS = 3  # 642 directions, 4 to 5 degrees apart: finer differences of view do not matter
+LEAST_VISIBLE_SHARE = 0.6  # of the best visible frame's visible fraction: a hidden side teaches nothing
+LEAST_VISIBLE_PX = 400
+
+
+def view_direction(sighting: Sighting) -> Floats:
+    """(3,) unit vector in object coordinates, from the object's origin towards the camera."""
+    towards = sighting.T_cam_obj.inverse().translation_m
+    return towards / max(float(np.linalg.norm(towards)), 1e-12)
+
+
+def choose_reference_frames(sightings: Sequence[Sighting], count: int) -> list[Sighting]:
+    """Up to count sightings that see the object well and from directions as different as can be.
+
+    Viewing directions in the object's frame are snapped to an icosphere; of the frames at one direction the best
+    visible counts; farthest-point sampling starts at the best visible frame of all. Deterministic: ties go to the
+    lower index. Raises OnboardingError if no frame shows the object well enough.
+    """
+    best_fraction = max((s.visible_fraction for s in sightings), default=0.0)
+    usable = [
+        s
+        for s in sightings
+        if s.visible_px >= LEAST_VISIBLE_PX and s.visible_fraction >= LEAST_VISIBLE_SHARE * best_fraction
+    ]
+    if not usable:
+        most = max((s.visible_px for s in sightings), default=0)
+        raise OnboardingError(
+            f"none of {len(sightings)} frames shows the object well enough for a reference: "
+            f"at most {most} pixels of it are visible, {LEAST_VISIBLE_PX} are needed"
+        )
+    usable.sort(key=lambda s: (-s.visible_px, s.index))
+    sphere = icosphere_directions(SUBDIVISIONS)
+    nodes = nearest_direction(np.stack([view_direction(s) for s in usable]), sphere)
+    occupied, first = np.unique(nodes, return_index=True)  # first = the best visible frame at each direction
+    order = np.argsort([usable[i].index for i in first], kind="stable")
+    occupied, first = occupied[order], first[order]
+    seed = int(np.flatnonzero(first == 0)[0])
+    picked = farthest_point_sampling(sphere[occupied], count, seed)
+    return [usable[int(first[i])] for i in picked]

@@ -1,0 +1,114 @@
+"""Reference frames -> a concept model. The method on one page."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from reference.fusion import confirmed, diameter_of, fuse
+from reference.keyframes import choose_reference_frames
+from reference.quality import judge
+from tracker.cloud import LEAST_POINTS, CloudConfig, inliers
+from tracker.cloud import lift
+from tracker.concept import ConceptModel
+from tracker.errors import OnboardingError
+from tracker.frame import PosedFrame
+from tracker.geometry import Floats
+from tracker.saliency import SaliencyBackend
+from tracker.sources import PosedSource, Sighting
+from tracker.view import ViewConfig, bounding_box, view_object
+
+logger = logging.getLogger(__name__)
+
+
+def read_reference_frames(source: PosedSource, object_id: str, views: int) -> list[PosedFrame]:
+    """The frames of a recording that `choose_reference_frames` picks for an object, read and with their masks."""
+    return [_posed(source, object_id, s) for s in choose_reference_frames(source.sightings(object_id), views)]
+
+
+def onboard(
+    frames: Sequence[PosedFrame],
+    backend: SaliencyBackend,
+    view_config: ViewConfig | None = None,
+    cloud_config: CloudConfig | None = None,
+) -> ConceptModel:
+    """One concept model from frames with known poses and masks of one object. Its frame is that of the poses.
+
+    Raises OnboardingError where a frame has no usable points or the frames together do not make a model.
+    """
+    view_config, cloud_config = view_config or ViewConfig(), cloud_config or CloudConfig()
+    if not frames:
+        raise OnboardingError("onboarding needs at least one reference frame")
+
+    # How big is it? The surfaces alone, at a resolution guessed from the mask.
+    surfaces = [_surface(frame, view_config, cloud_config) for frame in frames]
+    diameter_m = _diameter(surfaces, frames)
+
+    # What is where? The concepts, at scales relative to that size.
+    views = [view_object(f.frame, f.mask, diameter_m, view_config) for f in frames]
+    seen = [view for view in views if view is not None]
+    clouds = [lift(view, maps, cloud_config) for view, maps in zip(seen, backend(seen), strict=True)]
+
+    # One model of all views.
+    fused = fuse(clouds, frames, diameter_m, voxel_m=diameter_m / view_config.pixels_across)
+    model = ConceptModel(
+        object_id=frames[0].object_id,
+        diameter_m=diameter_m,
+        view_directions=np.stack([_direction(frame) for frame in frames]),
+        labels=backend.labels,
+        backend=backend.name,
+        fingerprint=backend.fingerprint,
+        notes={"reference_frames": [frame.frame.provenance.source for frame in frames]},
+        **{name: getattr(fused, name) for name in fused.__slots__},
+    )
+    quality = judge(model)
+    if not quality.usable:
+        raise OnboardingError(f"no usable model of object {model.object_id!r}: {'; '.join(quality.problems)}")
+    for problem in quality.problems:
+        logger.warning("model of object %r: %s", model.object_id, problem)
+    return replace(model, notes={**model.notes, "quality": asdict(quality)})
+
+
+def _posed(source: PosedSource, object_id: str, sighting: Sighting) -> PosedFrame:
+    frame = source[sighting.index]
+    if object_id not in frame.masks:
+        raise OnboardingError(f"{frame.provenance.source} has no mask of object {object_id!r}")
+    return PosedFrame(frame, object_id, sighting.T_cam_obj, frame.masks[object_id])
+
+
+def _surface(frame: PosedFrame, view_config: ViewConfig, cloud_config: CloudConfig) -> Floats:
+    """Points (N, 3) of the masked surface in object coordinates."""
+    where = f"reference frame {frame.frame.provenance.source}, object {frame.object_id!r}"
+    box = bounding_box(frame.mask)
+    if box is None:
+        raise OnboardingError(f"{where}: the mask is empty")
+    depth_m = frame.frame.depth_m[frame.mask & (frame.frame.depth_m > 0)]
+    if len(depth_m) < LEAST_POINTS:
+        raise OnboardingError(f"{where}: {len(depth_m)} masked pixels have depth, {LEAST_POINTS} are needed")
+    width_px = float(np.hypot(box.x1 - box.x0, box.y1 - box.y0))
+    guess_m = width_px * float(np.median(depth_m)) / frame.frame.intrinsics.fx
+    view = view_object(frame.frame, frame.mask, guess_m, view_config)
+    assert view is not None  # the mask has pixels with depth
+    rows, columns = np.nonzero(view.has_depth)
+    points = view.camera.unproject(columns, rows, view.depth_m[rows, columns].astype(np.float64))
+    kept = points[inliers(points, cloud_config)]
+    if len(kept) < LEAST_POINTS:
+        raise OnboardingError(f"{where}: {len(kept)} points without outliers, {LEAST_POINTS} are needed")
+    return frame.T_cam_obj.inverse() @ kept
+
+
+def _diameter(surfaces: Sequence[Floats], frames: Sequence[PosedFrame]) -> float:
+    rough_m = diameter_of(np.concatenate(surfaces))
+    kept = []
+    for k, points in enumerate(surfaces):
+        others = [frame for j, frame in enumerate(frames) if j != k]
+        kept.append(points[confirmed(points, others, 0.05 * rough_m)])
+    return diameter_of(np.concatenate(kept))
+
+
+def _direction(frame: PosedFrame) -> Floats:
+    towards = frame.T_cam_obj.inverse().translation_m
+    return towards / np.linalg.norm(towards)

@@ -1,0 +1,138 @@
+"""The concept model of one object: what `reference` writes and `tracker` reads.
+
+On disk it is a safetensors file: arrays and a JSON header, nothing that could run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import safetensors
+import safetensors.numpy
+
+from tracker.errors import ModelError
+from tracker.geometry import Floats
+from tracker.saliency import SaliencyBackend
+from tracker.view import Float32s
+
+FORMAT_VERSION = 1
+FORMAT = "conceptrack concept model"
+ARRAYS = ("points", "normals", "colours", "saliency", "view_count", "agreement", "view_directions")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConceptModel:
+    """Points of an object's surface that know what they are. In object coordinates, metres.
+
+    object_id: as in frames' masks. points, normals: (N, 3). colours: (N, 3) float32 RGB in [0, 255].
+    saliency: (N, L) float32 in [0, 1], a value a concept, before the softmax. view_count: (N,) int32, reference views
+    that saw the point. agreement: (N,) float32 in [0, 1], cosine between what the views say of it (1 where one saw it).
+    view_directions: (K, 3) unit, from the object towards the cameras of the reference views.
+    diameter_m: greatest distance between two points seen; the scale at which saliency was measured.
+    labels: the L concepts. backend, fingerprint: who measured them and with which settings.
+    notes: how it came about (reference frames, quality), JSON-ready.
+    """
+
+    object_id: str
+    points: Floats
+    normals: Floats
+    colours: Float32s
+    saliency: Float32s
+    view_count: np.ndarray
+    agreement: Float32s
+    view_directions: Floats
+    diameter_m: float
+    labels: tuple[str, ...]
+    backend: str
+    fingerprint: str
+    notes: dict[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def require_backend(self, backend: SaliencyBackend) -> None:
+        """Raises ModelError unless this backend measured the model, with the settings that it has now."""
+        if (self.fingerprint, self.labels) != (backend.fingerprint, backend.labels):
+            raise ModelError(
+                f"the model of {self.object_id!r} was made by backend {self.backend} ({self.fingerprint}), "
+                f"it cannot be tracked with {backend.name} ({backend.fingerprint}): make it again with "
+                f"python -m reference ... --backend {backend.name}"
+            )
+
+    def save(self, path: str | Path) -> None:
+        """Write the file whole or not at all."""
+        path = Path(path)
+        header = {
+            "format": FORMAT,
+            "version": FORMAT_VERSION,
+            "object_id": self.object_id,
+            "diameter_m": self.diameter_m,
+            "labels": self.labels,
+            "backend": self.backend,
+            "fingerprint": self.fingerprint,
+            "notes": self.notes,
+        }
+        arrays = {name: np.ascontiguousarray(getattr(self, name)) for name in ARRAYS}
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(path.name + ".partial")
+        safetensors.numpy.save_file(arrays, partial, metadata={"concept_model": json.dumps(header)})
+        os.replace(partial, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> ConceptModel:
+        """Raises ModelError where the file is missing, damaged, of another version, or no concept model at all."""
+        path = Path(path)
+        if not path.is_file():
+            raise ModelError(f"{path}: there is no such model file")
+        try:
+            with safetensors.safe_open(path, framework="numpy") as file:
+                header = json.loads((file.metadata() or {}).get("concept_model", "{}"))
+                _check_header(path, header)
+                arrays = {name: file.get_tensor(name) for name in ARRAYS}
+        except safetensors.SafetensorError as error:
+            raise ModelError(f"{path}: not a whole concept model ({error})") from error
+        _check_arrays(path, arrays, len(header["labels"]))
+        return cls(
+            object_id=header["object_id"],
+            diameter_m=header["diameter_m"],
+            labels=tuple(header["labels"]),
+            backend=header["backend"],
+            fingerprint=header["fingerprint"],
+            notes=header["notes"],
+            **arrays,
+        )
+
+
+def _check_header(path: Path, header: dict[str, Any]) -> None:
+    if header.get("format") != FORMAT:
+        raise ModelError(f"{path}: a safetensors file, but not a concept model")
+    if header.get("version") != FORMAT_VERSION:
+        raise ModelError(
+            f"{path}: a concept model of version {header.get('version')}, this program reads version {FORMAT_VERSION}: "
+            "make it again with python -m reference"
+        )
+    expected = {"object_id": str, "diameter_m": float, "labels": list, "backend": str, "fingerprint": str, "notes": dict}
+    for key, kind in expected.items():
+        if not isinstance(header.get(key), kind):
+            raise ModelError(f"{path}: the header's {key} is {header.get(key)!r}, expected a {kind.__name__}")
+
+
+def _check_arrays(path: Path, arrays: dict[str, np.ndarray], concepts: int) -> None:
+    points = len(arrays["points"])
+    shapes = {
+        "points": (points, 3),
+        "normals": (points, 3),
+        "colours": (points, 3),
+        "saliency": (points, concepts),
+        "view_count": (points,),
+        "agreement": (points,),
+        "view_directions": (len(arrays["view_directions"]), 3),
+    }
+    for name, shape in shapes.items():
+        if arrays[name].shape != shape or not np.isfinite(arrays[name]).all():
+            raise ModelError(f"{path}: {name} has shape {arrays[name].shape} (expected {shape}) or is not finite")

@@ -1,0 +1,94 @@
+"""The settings of all stages together. Defaults live in the code; a file holds differences only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from tracker.cloud import CloudConfig
+from tracker.errors import ConfigError
+from tracker.matching import MatchingConfig
+from tracker.pose_filter import FilterConfig
+from tracker.refinement import RefinementConfig
+from tracker.registration import RegistrationConfig
+from tracker.verification import VerificationConfig
+from tracker.view import ViewConfig
+
+
+class TrackerConfig(BaseModel):
+    """prior: start from the predicted pose and search globally only where that fails; False makes every frame
+    independent, as in the paper. accept: confidence under which no pose is reported. trust: confidence at which a
+    pose found from the prediction is taken without a global search. verified: candidates that are refined.
+    seed: of the sampling. device: of matching and registration, "auto" is CUDA where there is one."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    prior: bool = True
+    accept: float = Field(0.25, ge=0, le=1)
+    trust: float = Field(0.6, ge=0, le=1)
+    verified: int = Field(5, ge=1, le=64)
+    seed: int = 42
+    device: str = "auto"
+    view: ViewConfig = ViewConfig()
+    cloud: CloudConfig = CloudConfig()
+    matching: MatchingConfig = MatchingConfig()
+    registration: RegistrationConfig = RegistrationConfig()
+    verification: VerificationConfig = VerificationConfig()
+    refinement: RefinementConfig = RefinementConfig()
+    filter: FilterConfig = FilterConfig()
+
+    @property
+    def torch_device(self) -> torch.device:
+        """Raises ConfigError where the device does not exist here."""
+        name = ("cuda" if torch.cuda.is_available() else "cpu") if self.device == "auto" else self.device
+        try:
+            torch.empty(0, device=name)
+        except (RuntimeError, AssertionError) as error:
+            raise ConfigError(f"device {name!r} cannot be used here: {str(error).splitlines()[0]}") from error
+        return torch.device(name)
+
+
+def read_config(path: str | Path | None) -> TrackerConfig:
+    """Defaults with the differences of a YAML file, None for the defaults alone.
+
+    Raises ConfigError that names the file, the setting, and the settings that there are.
+    """
+    if path is None:
+        return TrackerConfig()
+    try:
+        content = yaml.safe_load(Path(path).read_text())
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ConfigError(f"{path}: cannot be read as YAML ({error})") from error
+    return parse_config(content or {}, str(path))
+
+
+def parse_config(content: Any, where: str) -> TrackerConfig:
+    try:
+        return TrackerConfig.model_validate(content)
+    except ValidationError as error:
+        raise ConfigError("\n".join(f"{where}: {_complaint(e)}" for e in error.errors())) from error
+
+
+def dump_config(config: TrackerConfig) -> str:
+    """All settings as YAML, defaults included."""
+    return yaml.safe_dump(config.model_dump(), sort_keys=False)
+
+
+def _complaint(error: Any) -> str:
+    name = ".".join(str(part) for part in error["loc"]) or "the file"
+    if error["type"] == "extra_forbidden":
+        known = _settings_at([str(part) for part in error["loc"][:-1]])
+        return f"there is no setting {name!r}; there are {', '.join(known)}"
+    return f"{name}: {error['msg']} (got {error['input']!r})"
+
+
+def _settings_at(path: list[str]) -> list[str]:
+    """Names of the settings of the stage that the path leads to."""
+    model: type[BaseModel] = TrackerConfig
+    for part in path:
+        model = type(model.model_fields[part].default)
+    return list(model.model_fields)

@@ -1,0 +1,202 @@
+"""The tracker. The method on one page: `ObjectTracker.step` and `_Track.step`."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+
+from tracker.appearance import ViewAppearance, view_appearance
+from tracker.cloud import LEAST_POINTS, PointCloud, lift
+from tracker.concept import ConceptModel
+from tracker.config import TrackerConfig
+from tracker.errors import ConfigError, FrameError
+from tracker.frame import Frame
+from tracker.geometry import Pose
+from tracker.matching import Matcher
+from tracker.pose_filter import PoseFilter
+from tracker.refinement import Refined, Refiner
+from tracker.registration import register
+from tracker.result import TrackResult, TrackState
+from tracker.saliency import SaliencyBackend, open_backend
+from tracker.stopwatch import Stopwatch
+from tracker.verification import Evidence, Verifier
+from tracker.view import ObjectView, view_object
+
+logger = logging.getLogger(__name__)
+
+
+class ObjectTracker:
+    """Follows objects through the frames of one camera.
+
+    models: one concept model an object. backend: the one that made them; None opens it by name.
+    Raises ModelError where a model is of another backend, ConfigError where two models are of the same object.
+    """
+
+    def __init__(
+        self,
+        models: ConceptModel | Sequence[ConceptModel],
+        config: TrackerConfig | None = None,
+        backend: SaliencyBackend | None = None,
+    ) -> None:
+        models = [models] if isinstance(models, ConceptModel) else list(models)
+        if not models:
+            raise ConfigError("a tracker needs at least one model")
+        if len({model.object_id for model in models}) < len(models):
+            raise ConfigError(f"two models are of one object: {', '.join(model.object_id for model in models)}")
+        config = config or TrackerConfig()
+        backend = backend or open_backend(models[0].backend)
+        for model in models:
+            model.require_backend(backend)
+        self._tracks = [_Track(model, config, backend) for model in models]
+        self._last_stamp_ns = -1
+
+    def step(self, frame: Frame) -> tuple[TrackResult, ...]:
+        """Every model's result, in their order. Raises FrameError where time does not advance; nothing is lost then."""
+        if frame.stamp_ns <= self._last_stamp_ns:
+            raise FrameError(
+                f"frame {frame.index} of {frame.provenance.source}: its stamp {frame.stamp_ns} ns is not after "
+                f"the last one, {self._last_stamp_ns} ns"
+            )
+        self._last_stamp_ns = frame.stamp_ns
+        return tuple(track.step(frame) for track in self._tracks)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sight:
+    """What one frame shows of the object."""
+
+    view: ObjectView
+    cloud: PointCloud
+    appearance: ViewAppearance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Hypothesis:
+    refined: Refined
+    evidence: Evidence
+    origin: str
+
+
+class _Track:
+    """One object's stages and its state between frames."""
+
+    def __init__(self, model: ConceptModel, config: TrackerConfig, backend: SaliencyBackend) -> None:
+        self._model, self._config, self._backend = model, config, backend
+        self._device = config.torch_device
+        self._match = Matcher(model, config.matching, self._device)
+        self._refine = Refiner(model, config.refinement, config.view.pixels_across)
+        self._verify = Verifier(model, config.verification, config.view.pixels_across)
+        self._filter = PoseFilter(config.filter)
+        self._state = TrackState.INITIALISING
+
+    def step(self, frame: Frame) -> TrackResult:
+        clock = Stopwatch()
+
+        # 1. What does the frame show of the object?
+        sight = self._look(frame, clock)
+        if isinstance(sight, str):
+            return self._lost(frame, sight, clock)
+
+        # 2. Is it where it was expected?
+        found = self._from_prediction(frame, sight, clock)
+
+        # 3. If not clearly so, where else could it be?
+        if found is None or found.evidence.score < self._config.trust:
+            elsewhere = self._from_anywhere(sight, clock)
+            found = max((h for h in (found, elsewhere) if h), key=lambda h: h.evidence.score, default=None)
+        if found is None or found.evidence.score < self._config.accept:
+            score = found.evidence.score if found else 0.0
+            return self._lost(frame, f"poor fit: the best pose explains {score:.2f} of what should be seen", clock)
+
+        # 4. What does that say about its pose, given where it has been?
+        return self._tracked(frame, found, clock)
+
+    def _look(self, frame: Frame, clock: Stopwatch) -> _Sight | str:
+        """The object's view, cloud and colours, or the reason why there are none."""
+        mask = frame.masks.get(self._model.object_id)
+        if mask is None:
+            return f"no mask of object {self._model.object_id!r} was given"
+        if not mask.any():
+            return "out of view: the mask is empty"
+        with clock("view"):
+            view = view_object(frame, mask, self._model.diameter_m, self._config.view)
+        if view is None:
+            return "no depth within the mask"
+        with clock("saliency"):
+            saliency = self._backend([view])[0]
+        with clock("cloud"):
+            cloud = lift(view, saliency, self._config.cloud)
+            appearance = view_appearance(view)
+        if len(cloud) < LEAST_POINTS:
+            return f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
+        return _Sight(view, cloud, appearance)
+
+    def _from_prediction(self, frame: Frame, sight: _Sight, clock: Stopwatch) -> _Hypothesis | None:
+        predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
+        if predicted is None:
+            return None
+        with clock("refinement"):
+            return self._refined(predicted, sight, "prediction")
+
+    def _from_anywhere(self, sight: _Sight, clock: Stopwatch) -> _Hypothesis | None:
+        """The best of the poses on which concept correspondences agree."""
+        with clock("matching"):
+            correspondences = self._match(sight.cloud)
+        with clock("registration"):
+            generator = torch.Generator(self._device).manual_seed(self._config.seed)
+            candidates = register(correspondences, sight.cloud, self._model, self._config.registration, generator)
+        with clock("verification"):
+            rough = [(self._verify(c.T_cam_obj, sight.view, sight.appearance).score, c) for c in candidates]
+            rough.sort(key=lambda scored: -scored[0])
+        with clock("refinement"):
+            refined = [self._refined(c.T_cam_obj, sight, "search") for _, c in rough[: self._config.verified]]
+        return max((h for h in refined if h), key=lambda h: h.evidence.score, default=None)
+
+    def _refined(self, T_start: Pose, sight: _Sight, origin: str) -> _Hypothesis | None:
+        refined = self._refine(T_start, sight.cloud, sight.view, sight.appearance)
+        if refined is None:
+            return None
+        return _Hypothesis(refined, self._verify(refined.T_cam_obj, sight.view, sight.appearance), origin)
+
+    def _tracked(self, frame: Frame, found: _Hypothesis, clock: Stopwatch) -> TrackResult:
+        raw, information = found.refined.T_cam_obj, found.refined.information
+        with clock("filter"):
+            if not self._config.prior or self._filter.predict(frame.stamp_ns) is None:
+                filtered = self._filter.start(raw, information, frame.stamp_ns)
+            else:
+                filtered = self._filter.update(raw, information, frame.stamp_ns)
+                if not filtered.within_gate:  # verified all the same, so the motion model was wrong, not the pose
+                    filtered = self._filter.start(raw, information, frame.stamp_ns)
+        self._state = TrackState.TRACKING
+        return TrackResult(
+            stamp_ns=frame.stamp_ns,
+            object_id=self._model.object_id,
+            pose=filtered.T_cam_obj,
+            state=self._state,
+            confidence=found.evidence.score,
+            covariance=filtered.covariance,
+            reason=f"found by {found.origin}",
+            raw_pose=raw,
+            evidence=found.evidence,
+            timings_ms=clock.timings_ms(),
+        )
+
+    def _lost(self, frame: Frame, reason: str, clock: Stopwatch) -> TrackResult:
+        if self._state is TrackState.TRACKING:
+            logger.info("object %r lost at frame %d: %s", self._model.object_id, frame.index, reason)
+            self._state = TrackState.LOST
+        return TrackResult(
+            stamp_ns=frame.stamp_ns,
+            object_id=self._model.object_id,
+            pose=None,
+            state=self._state,
+            confidence=0.0,
+            covariance=None,
+            reason=reason,
+            raw_pose=None,
+            evidence=None,
+            timings_ms=clock.timings_ms(),
+        )

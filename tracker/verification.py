@@ -1,0 +1,107 @@
+"""How well a pose explains the picture, whatever correspondences or prediction it came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from tracker.appearance import ViewAppearance, model_appearance
+from tracker.concept import ConceptModel
+from tracker.geometry import Pose
+from tracker.projection import nearest_pixels, not_self_hidden, project
+from tracker.view import ObjectView
+
+
+class VerificationConfig(BaseModel):
+    """model_points: how many are looked at. depth_sigma: distance at which a surface still agrees, as a share of the
+    diameter, at least depth_sigma_least_m. lab_sigma: colour difference at which it still agrees. colour_share: share
+    of the score that colour decides; geometry decides the rest."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    model_points: int = Field(1000, ge=50)
+    depth_sigma: float = Field(0.03, gt=0)
+    depth_sigma_least_m: float = Field(0.003, gt=0)
+    lab_sigma: float = Field(14.0, gt=0)
+    colour_share: float = Field(0.7, ge=0, le=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour.
+    surface: the same in place alone. colour: agreement of the colours where the place agrees.
+    seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
+    outside the mask. hidden: share of the camera-facing model that something in front hides."""
+
+    score: float
+    surface: float
+    colour: float
+    seen_through: float
+    outside: float
+    hidden: float
+
+
+NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+class Verifier:
+    """Judges poses of one model. Each point counts by the cosine of its incidence: grazing surfaces prove little."""
+
+    def __init__(self, model: ConceptModel, config: VerificationConfig, pixels_across: int) -> None:
+        self._config, self._diameter_m = config, model.diameter_m
+        chosen = np.random.default_rng(0).permutation(len(model))[: config.model_points]
+        self._points, self._normals = model.points[chosen], model.normals[chosen]
+        self._lab = model_appearance(model, pixels_across).lab[0][chosen]
+        self._sigma_m = max(config.depth_sigma * model.diameter_m, config.depth_sigma_least_m)
+
+    def __call__(self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance) -> Evidence:
+        at = project(self._points, self._normals, T_cam_obj, view.camera)
+        faces = (at.facing > 0.2) & (at.points_cam[:, 2] > 0)
+        if not faces.any():
+            return NOTHING_SEEN
+        faces &= not_self_hidden(at, self._diameter_m)
+        rows, columns = nearest_pixels(at, view.camera)
+        on_object = at.within(view.camera, 0) & view.inside[rows, columns]
+        measured_m = np.where(on_object, view.depth_m[rows, columns], _frame_depth_m(at.points_cam, view))
+        behind_m = np.where(measured_m > 0, measured_m - at.points_cam[:, 2], 0.0)
+        reach_m = 2.5 * self._sigma_m
+        hidden = faces & ~on_object & (behind_m < -reach_m)
+        due = faces & ~hidden
+        weights = at.facing * due
+        total = weights.sum()
+        if total <= 0:
+            return NOTHING_SEEN
+        in_place = due & on_object & (measured_m > 0) & (np.abs(behind_m) < reach_m)
+        surface = weights * in_place * np.exp(-0.5 * (behind_m / self._sigma_m) ** 2)
+        colour = self._colour_agreement(appearance.lab[0][rows, columns], in_place)
+        colour_share = self._config.colour_share
+        return Evidence(
+            score=float((surface * (1 - colour_share + colour_share * colour)).sum() / total),
+            surface=float(surface.sum() / total),
+            colour=float((surface * colour).sum() / max(surface.sum(), 1e-9)),
+            seen_through=float((weights * (on_object & (behind_m > reach_m))).sum() / total),
+            outside=float((weights * ~on_object).sum() / total),
+            hidden=float((at.facing * hidden).sum() / (at.facing * faces).sum()),
+        )
+
+    def _colour_agreement(self, lab: np.ndarray, in_place: np.ndarray) -> np.ndarray:
+        """(N,) in [0, 1], after the offset that all points share (exposure, white balance) is taken off and punished."""
+        if in_place.sum() < 20:
+            return np.zeros(len(lab))
+        offset = np.median((lab - self._lab)[in_place], axis=0)
+        difference = np.linalg.norm((lab - self._lab - offset) * (0.6, 1, 1), axis=1)
+        drift = np.linalg.norm(offset * (0.3, 1, 1))
+        return np.exp(-0.5 * (difference / self._config.lab_sigma) ** 2 - 0.5 * (drift / 25) ** 2)
+
+
+def _frame_depth_m(points_cam: np.ndarray, view: ObjectView) -> np.ndarray:
+    """(N,) depth of the frame, not of the view, where points project to; 0 outside the frame."""
+    camera = view.frame.intrinsics
+    depth_m = np.maximum(points_cam[:, 2], 1e-6)
+    columns = np.rint(points_cam[:, 0] / depth_m * camera.fx + camera.cx)
+    rows = np.rint(points_cam[:, 1] / depth_m * camera.fy + camera.cy)
+    inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
+    clipped = (np.where(inside, rows, 0).astype(np.intp), np.where(inside, columns, 0).astype(np.intp))
+    return np.where(inside, view.frame.depth_m[clipped], 0.0)
