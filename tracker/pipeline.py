@@ -138,8 +138,12 @@ class _Track:
         predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
         if predicted is None:
             return None
+        with clock("matching"):
+            correspondences = self._match(sight.cloud)
         with clock("refinement"):
-            return self._refined(predicted, sight, "prediction")
+            a = self._refined(predicted, sight, "prediction")
+            b = self._refined(self._refine.pull(predicted, correspondences, sight.cloud), sight, "pull")
+            return max((h for h in (a, b) if h), key=lambda h: h.evidence.score, default=None)
 
     def _from_anywhere(self, sight: _Sight, clock: Stopwatch) -> _Hypothesis | None:
         """The best of the poses on which concept correspondences agree."""

@@ -19,6 +19,7 @@ from tracker.appearance import ModelAppearance, ViewAppearance, model_appearance
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
 from tracker.geometry import Floats, Pose
+from tracker.matching import Correspondences
 from tracker.projection import interpolate, nearest_pixels, project
 from tracker.view import ObjectView
 
@@ -79,6 +80,27 @@ class Refiner:
         """None where too few model points meet the object's pixels."""
         T_cam_obj = self.closest_points(T_start, cloud)
         return None if T_cam_obj is None else self._direct(T_cam_obj, view, appearance)
+
+    def pull(self, T_cam_obj: Pose, correspondences: Correspondences, cloud: PointCloud) -> Pose:
+        """Move a pose by the concept correspondences near it: point-to-point, reweighted, with shrinking reach."""
+        points = cloud.points[correspondences.query_index]
+        model_points = self._model.points[correspondences.model_index]
+        normals, model_normals = (
+            cloud.normals[correspondences.query_index],
+            self._model.normals[correspondences.model_index],
+        )
+        for reach_m in np.geomspace(0.3, 0.06, 6) * self._model.diameter_m:
+            arms = model_points @ T_cam_obj.rotation.T
+            residual_m = points - arms - T_cam_obj.translation_m
+            same_side = np.einsum("ni,ni->n", model_normals @ T_cam_obj.rotation.T, normals) > 0.3
+            weights = same_side * _tukey(np.linalg.norm(residual_m, axis=1), reach_m)
+            if np.count_nonzero(weights) < LEAST_POINTS:
+                return T_cam_obj
+            c, d = np.average(arms, axis=0, weights=weights), np.average(points, axis=0, weights=weights)
+            u, _, vt = np.linalg.svd((weights[:, None] * (points - d)).T @ (arms - c))
+            turn = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+            T_cam_obj = Pose(turn @ T_cam_obj.rotation, d - turn @ c)
+        return T_cam_obj
 
     def closest_points(self, T_cam_obj: Pose, cloud: PointCloud) -> Pose | None:
         """Point-to-plane ICP from the cloud to the model, with Tukey weights of shrinking reach."""

@@ -72,7 +72,8 @@ def read_request(argument: str) -> Request:
     """Raises SourceError that lists what there is where the scene, an option or a value is not known."""
     scene, _, query = argument.partition("?")
     if scene not in SCENES:
-        raise SourceError(f"synthetic:{argument}: there is no scene {scene!r}; there is {', '.join(SCENES)}")
+        known = ", ".join(f"{name} ({kind.summary})" for name, kind in SCENES.items())
+        raise SourceError(f"synthetic:{argument}: there is no scene {scene!r}; there is {known}")
     kind = SCENES[scene]
     given = _options(argument, query)
     if "object" in given and not kind.hero:

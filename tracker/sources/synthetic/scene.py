@@ -112,7 +112,7 @@ class SyntheticScene:
         return self._last[1]
 
     def _motion_px(self, index: int) -> tuple[float, float]:
-        """By how much the picture of the first object moves while the shutter is open."""
+        """By how much the moving camera shifts the picture of the first object while the shutter is open."""
         now, then = (self._camera_pose(i).inverse() for i in (index, index + SHUTTER))
         place = self._layout.tracked[0].at(index / RATE_HZ).translation_m[None]
         x, y = (self.intrinsics.project(then @ place) - self.intrinsics.project(now @ place))[0]

@@ -53,9 +53,7 @@ def lamp_and_sky(
     starts = points[chosen.ravel()] + LIFT_M * normals
     sample = _tiled(_order(), chosen.shape)
     lamp = world.occluded(starts, LAMP_M + _lamp_offsets()[sample] - starts, time_s)
-    towards = _hemisphere()[sample] + normals * np.float32(
-        1.02
-    )  # unit sphere on the tip of the normal: cosine weighted
+    towards = _hemisphere()[sample] + normals * np.float32(1.02)  # a unit sphere on the normal's tip: cosine weighted
     sky = world.occluded(starts, towards * np.float32(NEARBY_M / 1.4), time_s)
     dark = [blocked.reshape(chosen.shape).astype(np.float32) for blocked in (lamp, sky)]
     lit = [1 - values.ravel() for values in shared(dark, hits.owner.reshape(shape), hits.distance.reshape(shape))]

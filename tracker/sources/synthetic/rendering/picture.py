@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tracker.geometry import Intrinsics, Pose
 from tracker.sources.synthetic.rendering.lighting import lamp_and_sky, radiance, surface
-from tracker.sources.synthetic.rendering.raycast import Float32s, Hits, dot
+from tracker.sources.synthetic.rendering.raycast import NOTHING, Float32s, Hits, dot
 from tracker.sources.synthetic.rendering.world import World
 
 SUBPIXELS = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
@@ -37,18 +37,18 @@ def render(world: World, T_world_cam: Pose, camera: Intrinsics, time_s: float) -
     columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     origins, directions = pixel_rays(T_world_cam, camera, columns.ravel(), rows.ravel())
     hits = world.trace(origins, directions, time_s)
-    distance = np.where(np.isfinite(hits.distance), hits.distance, 0).astype(np.float32)
-    points = origins + directions * distance[:, None]
+    hits.distance[hits.owner == NOTHING] = 0
+    points = origins + directions * hits.distance[:, None]
     views = directions / np.sqrt(dot(directions, directions))[:, None]
     facing = np.abs(dot(views, hits.normals))
-    footprint_m = distance / np.float32(camera.fx) / np.sqrt(facing.clip(0.05))
+    footprint_m = hits.distance / np.float32(camera.fx) / np.sqrt(facing.clip(0.05))
     material = surface(world, hits, footprint_m / hits.texel_m)
     lamp, sky = lamp_and_sky(world, points, hits, time_s, shape)
-    light = radiance(material, points, hits, views, lamp, sky) * (hits.owner >= 0)[:, None]
+    light = radiance(material, points, hits, views, lamp, sky) * (hits.owner != NOTHING)[:, None]
     smooth = _smooth_edges(light.reshape(*shape, 3), hits, world, T_world_cam, camera, time_s)
     return Rendering(
         smooth,
-        distance.reshape(shape),
+        hits.distance.reshape(shape),
         hits.owner.reshape(shape),
         (material.albedo.mean(axis=1) * facing).reshape(shape),
         (material.gloss * cv2.pow(facing, 40).ravel()).reshape(shape),

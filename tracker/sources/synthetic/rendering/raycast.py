@@ -20,8 +20,8 @@ NOTHING = -1
 class Hits:
     """What N rays met. distance: in lengths of the ray's direction, infinite for nothing. owner: number of the thing.
 
-    normals: (N, 3) unit, in the frame of the rays, smooth over curved surfaces. uv: (N, 2) in the atlas. texel_m: (N,) size of a
-    texture pixel on the surface.
+    normals: (N, 3) unit, in the frame of the rays, smooth over curved surfaces. uv: (N, 2) in the atlas.
+    texel_m: (N,) size of a texture pixel on the surface.
     """
 
     distance: Float32s

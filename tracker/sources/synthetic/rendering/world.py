@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tracker.geometry import Pose
+from tracker.sources.synthetic.motion import Motion
 from tracker.sources.synthetic.rendering.atlas import Atlas
 from tracker.sources.synthetic.rendering.raycast import Float32s, Group, Hits
-from tracker.sources.synthetic.scenes.motion import Motion
 from tracker.sources.synthetic.things.mesh import Mesh
 from tracker.sources.synthetic.things.texture import pack
 from tracker.sources.synthetic.things.thing import Thing

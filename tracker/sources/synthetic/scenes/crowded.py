@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.geometry import Pose
+from tracker.sources.synthetic.motion import around, handheld, looking, swing
 from tracker.sources.synthetic.scenes import furniture, room
-from tracker.sources.synthetic.scenes.layout import Layout, flat, jitter, lay, stand
-from tracker.sources.synthetic.scenes.motion import around, handheld, looking, swing
+from tracker.sources.synthetic.scenes.layout import Layout, flat, lay, nudged, stand
 from tracker.sources.synthetic.things import books, clutter
 from tracker.sources.synthetic.things.objects import tracked_object
 
@@ -17,7 +17,7 @@ def tabletop(seed: int, _hero: str) -> Layout:
     tracked = [
         stand(tracked_object("cereal_box"), -0.13, 0.15, 16),
         stand(tracked_object("tea_box"), 0.19, 0.13, -24),
-        stand(tracked_object("soup_can"), 0.03, 0.095, -76),
+        stand(tracked_object("soup_can"), 0.03, 0.095, 14),
         stand(tracked_object("mug"), -0.075, -0.055, -28),
         lay(tracked_object("clamp"), -0.25, -0.03, 28),
         stand(tracked_object("bowl"), 0.155, -0.055, 0),
@@ -43,8 +43,8 @@ def tabletop(seed: int, _hero: str) -> Layout:
         ),
         seed,
     )
-    placed = [jitter(p, rng) for p in tracked]
-    around_it = [furniture.table(rng), *room.walls(rng, (204, 208, 202)), *(jitter(p, rng) for p in things)]
+    placed = [nudged(p, rng) for p in tracked]
+    around_it = [furniture.table(rng), *room.walls(rng, (204, 208, 202)), *(nudged(p, rng) for p in things)]
     return Layout(placed, around_it, camera)
 
 
@@ -53,10 +53,10 @@ def shelf(seed: int, _hero: str) -> Layout:
     low, middle, high = 0.0, 0.27, 0.55
     tracked = [
         stand(tracked_object("tea_box"), -0.20, -0.06, 12, middle),
-        stand(tracked_object("soup_can"), -0.05, -0.08, -100, middle),
+        stand(tracked_object("soup_can"), -0.05, -0.08, -10, middle),
         stand(tracked_object("mug"), 0.10, -0.07, -40, middle),
         stand(tracked_object("cereal_box"), -0.26, -0.02, -10, low),
-        stand(tracked_object("bowl"), 0.0, -0.06, 0, low),
+        stand(tracked_object("bowl"), -0.01, 0.0, 0, low),
         lay(tracked_object("clamp"), 0.22, -0.07, -150, low + 0.064),
     ]
     things = [
@@ -64,10 +64,10 @@ def shelf(seed: int, _hero: str) -> Layout:
         flat(books.night(), 0.22, -0.02, 4, low + 0.024),
         stand(books.rivers(), 0.21, 0.0, 0, middle),
         stand(books.paths(), 0.245, 0.0, 0, middle),
-        stand(clutter.book("Salt", "R. Mendes", (150, 40, 52), (244, 232, 208), (46, 130, 212)), 0.287, 0.0, 0, middle),
+        stand(books.salt(), 0.287, 0.0, 0, middle),
         stand(clutter.jar("honey"), -0.13, 0.05, -90, low),
         stand(clutter.jar("coffee"), 0.04, 0.06, -90, middle),
-        stand(clutter.fruit("apple"), 0.08, -0.12, 0, low),
+        stand(clutter.fruit("apple"), 0.075, -0.125, 0, low),
         stand(clutter.fruit("orange"), -0.32, -0.05, 0, middle),
     ]
 
@@ -77,4 +77,4 @@ def shelf(seed: int, _hero: str) -> Layout:
         return looking(eye_m, [0.10 * side, 0.0, 0.24])
 
     around_it = [furniture.bookcase(rng, (low, middle, high)), *room.walls(rng, (190, 200, 206)), *things]
-    return Layout([jitter(p, rng) for p in tracked], around_it, handheld(camera, seed))
+    return Layout([nudged(p, rng) for p in tracked], around_it, handheld(camera, seed))

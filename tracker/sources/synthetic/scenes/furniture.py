@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.geometry import Pose
+from tracker.sources.synthetic.motion import upright
 from tracker.sources.synthetic.rendering.world import Placed
 from tracker.sources.synthetic.scenes.wood import OAK, PINE, wood
 from tracker.sources.synthetic.things.drawing import Rgb, Sheet
@@ -13,14 +14,15 @@ from tracker.sources.synthetic.things.solids import BOX_SIDES, box
 from tracker.sources.synthetic.things.texture import glossy, pack, plain
 from tracker.sources.synthetic.things.thing import Thing
 
+MAT_M = 0.002  # thickness
 TABLE_M = (1.40, 0.90, 0.03)
 FLOOR_M = -0.74  # height of the floor
 
 
 def table(rng: np.random.Generator, colour: Rgb = OAK) -> Placed:
-    """A table of planks with a woven mat on it, on four legs."""
+    """A table of planks on four legs."""
     width, depth, thickness = (1000 * m for m in TABLE_M)
-    top = wood(width, depth, colour, 7, rng, 1.6)
+    top = wood(width, depth, colour, 7, rng, 1.35)
     edge = wood(width, thickness, colour, 1, rng, 1.0)
     texture, w = pack({"top": glossy(top, 0.35), "edge": glossy(edge, 0.3)})
     slab = box(TABLE_M, {**dict.fromkeys(BOX_SIDES, w["edge"]), "top": w["top"]})
@@ -35,7 +37,7 @@ def table(rng: np.random.Generator, colour: Rgb = OAK) -> Placed:
 
 
 def mat(rng: np.random.Generator, colour: Rgb, x_m: float, y_m: float, yaw_deg: float) -> Placed:
-    """A woven cloth with stripes, two millimetres thick."""
+    """A woven cloth with stripes."""
     size = (420.0, 300.0)
     sheet = Sheet(*size, colour, 2.0)
     dark, pale = [tuple(int(c) for c in np.clip(np.array(colour) * f, 0, 255)) for f in (0.62, 1.25)]
@@ -43,14 +45,13 @@ def mat(rng: np.random.Generator, colour: Rgb, x_m: float, y_m: float, yaw_deg: 
         sheet.rectangle(x - 2, 0, 4 if x in (18, 402) else 2, size[1], (dark[0], dark[1], dark[2]))
     for x in (40, 376):
         sheet.rectangle(x, 0, 9, size[1], (pale[0], pale[1], pale[2]))
-    rows, columns = np.indices(sheet.finished.shape[:2])
-    weave = 1 + 0.10 * (((rows // 2 + columns // 2) % 2) - 0.5) + 0.04 * rng.normal(0, 1, rows.shape)
-    cloth = (sheet.finished * weave[..., None]).clip(0, 255).astype(np.uint8)
+    picture = sheet.finished
+    rows, columns = picture.shape[:2]  # threads differ a little: an even weave would give moire
+    threads = rng.normal(0, 0.04, (rows, 1)) + rng.normal(0, 0.04, (1, columns)) + rng.normal(0, 0.04, (rows, columns))
+    cloth = (picture * (1 + threads[..., None])).clip(0, 255).astype(np.uint8)
     texture, w = pack({"cloth": glossy(cloth, 0.02), "hem": plain((dark[0], dark[1], dark[2]), 0)})
-    mesh = box((size[0] / 1000, size[1] / 1000, 0.002), {**dict.fromkeys(BOX_SIDES, w["hem"]), "top": w["cloth"]})
-    c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
-    T_world_mat = Pose(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]), np.array([x_m, y_m, 0.001]))
-    return Placed(Thing("mat", mesh, texture), T_world_mat)
+    mesh = box((size[0] / 1000, size[1] / 1000, MAT_M), {**dict.fromkeys(BOX_SIDES, w["hem"]), "top": w["cloth"]})
+    return Placed(Thing("mat", mesh, texture), upright(x_m, y_m, yaw_deg, MAT_M / 2))
 
 
 def bookcase(rng: np.random.Generator, boards_m: tuple[float, ...], colour: Rgb = PINE) -> Placed:

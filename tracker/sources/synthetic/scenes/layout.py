@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tracker.geometry import Pose
+from tracker.sources.synthetic.motion import Motion, lying, upright
 from tracker.sources.synthetic.rendering.world import Placed
-from tracker.sources.synthetic.scenes.motion import Motion, lying, upright
 from tracker.sources.synthetic.things.thing import Thing
 
 
@@ -39,8 +39,8 @@ def flat(book: Thing, x_m: float, y_m: float, yaw_deg: float, base_m: float) -> 
     return Placed(book, Pose(turn, np.array([x_m, y_m, base_m + half_m])))
 
 
-def jitter(placed: Placed, rng: np.random.Generator) -> Placed:
-    """The same a few millimetres and degrees elsewhere, so that seeds differ."""
+def nudged(placed: Placed, rng: np.random.Generator) -> Placed:
+    """The same, if it stands still, a few millimetres and degrees elsewhere, so that seeds differ."""
     if not isinstance(placed.T_world_thing, Pose):
         return placed
     nudge = Rotation.from_euler("z", rng.normal(0, 3), degrees=True).as_matrix()

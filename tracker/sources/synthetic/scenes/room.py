@@ -18,19 +18,17 @@ WALL_BEHIND_M = 0.80  # y of the wall behind the table
 
 
 def walls(rng: np.random.Generator, paint: Rgb) -> list[Placed]:
-    """Floor, ceiling and four walls around the table, skirting board, pictures, a sideboard."""
+    """Floor, ceiling and four walls around the table, with framed pictures and a socket."""
     floor = wood(3600, 3600, WALNUT, 24, rng, 0.3)
     pictures: dict[str, Texture] = {
         "floor": glossy(floor, 0.3),
         "ceiling": plain((236, 234, 230), 0),
-        "left": glossy(_wall(3600, paint, rng), 0),
-        "right": glossy(_wall(3600, paint, rng), 0),
-        "back": glossy(_wall(3600, paint, rng), 0),
+        "wall": glossy(_wall(3600, paint, rng), 0),
     }
     texture, w = pack(pictures)
     size = np.array([3.6, 3.6, 2.8])
-    windows = {"front": w["back"], "right": w["right"], "back": w["back"], "left": w["left"], "top": w["ceiling"]}
-    shell = box(size.tolist(), {**windows, "bottom": w["floor"]})
+    windows = {**dict.fromkeys(BOX_SIDES, w["wall"]), "top": w["ceiling"], "bottom": w["floor"]}
+    shell = box(size.tolist(), windows)
     T_world_shell = Pose(np.eye(3), np.array([0, WALL_BEHIND_M - size[1] / 2, FLOOR_M + size[2] / 2]))
     hung = [(poster(rng, 0), -0.46, 0.36), (poster(rng, 1), 0.50, 0.40), (socket(), 0.05, -0.32)]
     room = [Placed(Thing("room", shell.inside_out(), texture), T_world_shell)]
@@ -54,7 +52,7 @@ def _wall(length_mm: float, paint: Rgb, rng: np.random.Generator) -> Picture:
 
 def poster(rng: np.random.Generator, number: int) -> Thing:
     """A framed picture, 50 x 40 cm, that faces -y: one of four, its colours by the generator."""
-    sheet = Sheet(500, 400, (30, 28, 28), 1.6)
+    sheet = Sheet(500, 400, (30, 28, 28), 0.8)
     sheet.rectangle(14, 14, 472, 372, (246, 243, 236))
     hue = int(rng.integers(0, 180))
     colours = [_hsv((hue + shift) % 180, s, v) for shift, s, v in ((0, 150, 170), (20, 120, 220), (90, 140, 150))]

@@ -1,4 +1,4 @@
-"""Things that stand about and are not tracked: books, a parcel, fruit, a jar, a pencil pot, a coffee tin, a plant."""
+"""Things that stand about and are not tracked: a parcel, fruit, a jar, a pencil pot, a coffee tin, a plant."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ def fruit(kind: str) -> Thing:
     angle = np.linspace(0, np.pi, 25)
     if kind == "apple":
         radius, height = 0.037 * np.sin(angle) ** 0.8, 0.033 * np.cos(angle) - 0.012 * np.exp(-((angle / 0.35) ** 2))
-        skin = Sheet(240, 120, (186, 34, 36))
+        skin = Sheet(240, 120, (186, 34, 36), 2.5)
         skin.shade((206, 176, 74), (176, 24, 34), 0, 34)
     else:
         radius, height = 0.038 * np.sin(angle), 0.036 * np.cos(angle)
-        skin = Sheet(240, 120, (238, 138, 28))
+        skin = Sheet(240, 120, (238, 138, 28), 2.5)
     rng = np.random.default_rng(len(kind))
     for x, y in rng.uniform(0, 1, (700, 2)) * [240, 120]:
         streak = 5.0 if kind == "apple" else 0.4

@@ -82,7 +82,7 @@ class Sheet:
         quarter_turns: int = 0,
         flush_left: bool = False,
     ) -> None:
-        """Lettering centred at (x, y), or beginning there, with capitals that high unless that makes it wider than asked.
+        """Lettering centred at (x, y), or beginning there, capitals that high unless it would get too wide.
 
         Drawn apart and scaled to its place, so it fills the same box whatever font the installed OpenCV brings.
         """

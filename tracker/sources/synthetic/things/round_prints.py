@@ -1,6 +1,6 @@
 """What is printed on the round things: a soup can, a mug, a bowl; and the colours of the spring clamp.
 
-Wrapped pictures start at azimuth 0 (+x) and run against the clock seen from above; the middle of the picture faces -x.
+Wrapped pictures start at azimuth 0 (+x) and run against the clock seen from above: +x, +y, -x, -y (the front).
 """
 
 from __future__ import annotations
@@ -31,31 +31,26 @@ def _tomato(sheet: Sheet, x_mm: float, y_mm: float, radius_mm: float) -> None:
 
 
 def soup_label() -> Picture:
-    """A picture of tomatoes in front (+x), the table of nutrition to its right, recipe and bar code to its left."""
+    """Tomatoes in front (-y, three quarters along the picture), nutrition to their left, recipe and bar code behind."""
     width, height = CAN_LABEL_MM
+    front = 0.75 * width
     sheet = Sheet(width, height, CREAM, 6.0)
     sheet.shade((204, 44, 40), (150, 22, 26), 0, 36)
     sheet.rectangle(0, 36, width, 1.6, GOLD)
     sheet.shade((222, 206, 160), CREAM, 37.6, 12)
     sheet.rectangle(0, 84, width, 6, GREEN)
-    front = Sheet(90, height, CREAM, 6.0)  # crosses the seam of the texture: drawn apart, pasted in two halves
-    front.paste(sheet.finished[:, : 90 * 6], 0, 0, 90, height)
-    front.text("Old Garden", 45, 10, 8.5, CREAM, 66, "italic")
-    front.text("TOMATO", 45, 25, 12.5, (255, 232, 170), 74)
-    for x, y, radius in ((24, 66, 13), (68, 67, 12), (46, 63, 17)):
-        _tomato(front, x, y, radius)
-    front.text("creamy soup", 45, 87, 3.6, CREAM, 44, "plain")
-    star(front, 77, 46, 9, 14, 0.84, GOLD)
-    front.text("400 g", 77, 46, 3.8, INK, 13)
-    picture = front.finished
-    half = picture.shape[1] // 2
-    sheet.paste(picture[:, half:], 0, 0, 45, height)
-    sheet.paste(picture[:, :half], width - 45, 0, 45, height)
-    facts(sheet, 54, 40, 42)
-    sheet.text("per can", 75, 26, 6, CREAM, 40)
-    sheet.text("Serve hot", 128, 26, 8, CREAM, 46)
-    small_print(sheet, 103, 45, 40, 9, INK, 31, 4.2)
-    barcode(sheet, 148, 44, 25, 34, 6)
+    sheet.text("Old Garden", front, 10, 8.5, CREAM, 66, "italic")
+    sheet.text("TOMATO", front, 25, 12.5, (255, 232, 170), 74)
+    for x, y, radius in ((-21, 66, 13), (23, 67, 12), (1, 63, 17)):
+        _tomato(sheet, front + x, y, radius)
+    sheet.text("creamy soup", front, 87, 3.6, CREAM, 44, "plain")
+    star(sheet, front + 32, 46, 9, 14, 0.84, GOLD)
+    sheet.text("400 g", front + 32, 46, 3.8, INK, 13)
+    facts(sheet, 74, 40, 42)
+    sheet.text("per can", 95, 26, 6, CREAM, 40)
+    sheet.text("Serve hot", 24, 26, 8, CREAM, 40)
+    small_print(sheet, 5, 45, 38, 9, INK, 31, 4.2)
+    barcode(sheet, 47, 44, 23, 34, 6)
     return sheet.finished
 
 

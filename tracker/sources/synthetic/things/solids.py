@@ -1,6 +1,6 @@
 """The solids that things are built of: boxes, solids of revolution, tubes along a curve. Closed, with texture.
 
-Metres. Every function answers a mesh whose texture coordinates fill the windows that its docstring names.
+Metres. What a texture coordinate means is said for each; `Mesh.in_window` moves it to its place in a texture.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ GREEN, GOLD, CREAM = (22, 74, 50), (201, 164, 82), (240, 231, 205)
 
 def _panel(width_mm: float, height_mm: float) -> Sheet:
     """Dark green with a double gold frame and leaves in the corners."""
-    sheet = Sheet(width_mm, height_mm, GREEN, 6.0)
+    sheet = Sheet(width_mm, height_mm, GREEN, 5.0)
     sheet.shade((34, 98, 66), (12, 52, 36))
     for inset, line in ((3.0, 1.0), (5.0, 0.4)):
         right, bottom = width_mm - inset, height_mm - inset
@@ -79,7 +79,7 @@ def _top() -> Picture:
 
 
 def _bottom() -> Picture:
-    sheet = Sheet(SIZE_MM[0], SIZE_MM[1], CREAM, 6.0)
+    sheet = Sheet(SIZE_MM[0], SIZE_MM[1], CREAM, 5.0)
     sheet.text("L 0482  best before 09 27", 64, 50, 5, INK, 80, "plain")
     facts(sheet, 10, 8, 60, GREEN, 4)
     return sheet.finished

@@ -36,7 +36,8 @@ def pack(pictures: Mapping[Name, Texture]) -> tuple[Texture, dict[Name, Window]]
     """All pictures in one, in rows by falling height, and the window of each in [0, 1]."""
     padded = {name: _framed(picture) for name, picture in pictures.items()}
     area = sum(p.shape[0] * p.shape[1] for p in padded.values())
-    width = max(int(np.sqrt(area) * 1.1), *(p.shape[1] for p in padded.values()))
+    step = 2 ** (SCALES - 1)
+    width = max(int(np.sqrt(area) * 1.1) // step * step, *(p.shape[1] for p in padded.values()))
     corners: dict[Name, tuple[int, int]] = {}
     x = y = row_height = 0
     for name in sorted(padded, key=lambda n: -padded[n].shape[0]):
