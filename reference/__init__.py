@@ -1,0 +1,3 @@
+"""Reference frames of an object -> its concept model."""
+
+from __future__ import annotations

@@ -11,8 +11,7 @@ import numpy as np
 from reference.fusion import confirmed, diameter_of, fuse
 from reference.keyframes import choose_reference_frames
 from reference.quality import judge
-from tracker.cloud import LEAST_POINTS, CloudConfig, inliers
-from tracker.cloud import lift
+from tracker.cloud import LEAST_POINTS, CloudConfig, inliers, lift
 from tracker.concept import ConceptModel
 from tracker.errors import OnboardingError
 from tracker.frame import PosedFrame
@@ -91,9 +90,7 @@ def _surface(frame: PosedFrame, view_config: ViewConfig, cloud_config: CloudConf
     width_px = float(np.hypot(box.x1 - box.x0, box.y1 - box.y0))
     guess_m = width_px * float(np.median(depth_m)) / frame.frame.intrinsics.fx
     view = view_object(frame.frame, frame.mask, guess_m, view_config)
-    assert view is not None  # the mask has pixels with depth
-    rows, columns = np.nonzero(view.has_depth)
-    points = view.camera.unproject(columns, rows, view.depth_m[rows, columns].astype(np.float64))
+    points = np.zeros((0, 3)) if view is None else view.points()
     kept = points[inliers(points, cloud_config)]
     if len(kept) < LEAST_POINTS:
         raise OnboardingError(f"{where}: {len(kept)} points without outliers, {LEAST_POINTS} are needed")

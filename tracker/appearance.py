@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import small_gicp
 
 from tracker.concept import ConceptModel
 from tracker.geometry import Floats
-from tracker.saliency.attributes import smooth_inside
+from tracker.saliency.attributes import lab_of, smooth_inside
 from tracker.view import Float32s, ObjectView
 
 SMOOTHING_PX = (0.8, 2.5)  # of a view; the model is smoothed alike over its surface
@@ -35,13 +34,13 @@ class ModelAppearance:
 
 def view_appearance(view: ObjectView) -> ViewAppearance:
     weights = view.inside.astype(np.float32)
-    lab = cv2.cvtColor(view.rgb / np.float32(255), cv2.COLOR_RGB2Lab)
+    lab = lab_of(view.rgb)
     fine, coarse = (smooth_inside(lab, weights, sigma) for sigma in SMOOTHING_PX)
     return ViewAppearance((fine, coarse), (_gradient(fine, view.inside), _gradient(coarse, view.inside)))
 
 
 def model_appearance(model: ConceptModel, pixels_across: int) -> ModelAppearance:
-    lab = cv2.cvtColor(model.colours[None] / np.float32(255), cv2.COLOR_RGB2Lab)[0].astype(np.float64)
+    lab = lab_of(model.colours[None])[0].astype(np.float64)
     neighbours = min(SMOOTHING_NEIGHBOURS, len(model))
     index, squared = small_gicp.KdTree(model.points).batch_knn_search(model.points, neighbours)
     sigma_m = SMOOTHING_PX[1] * model.diameter_m / pixels_across

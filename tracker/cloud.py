@@ -25,10 +25,10 @@ class CloudConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    outlier_neighbours: int = Field(8, ge=2, le=64)
-    outlier_sigmas: float = Field(2.0, gt=0)
-    centre_sigmas: float = Field(2.5, gt=0)
-    normal_neighbours: int = Field(16, ge=4, le=128)
+    outlier_neighbours: int = Field(default=8, ge=2, le=64)
+    outlier_sigmas: float = Field(default=2.0, gt=0)
+    centre_sigmas: float = Field(default=2.5, gt=0)
+    normal_neighbours: int = Field(default=16, ge=4, le=128)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,7 @@ class PointCloud:
 def lift(view: ObjectView, saliency: Saliency, config: CloudConfig) -> PointCloud:
     """Back-project every pixel of the view that has depth, without the outliers. May be empty."""
     rows, columns = np.nonzero(view.has_depth)
-    points = view.camera.unproject(columns, rows, view.depth_m[rows, columns].astype(np.float64))
+    points = view.points()
     kept = inliers(points, config)
     points, rows, columns = points[kept], rows[kept], columns[kept]
     block = (view.box.x1 - view.box.x0) / view.camera.width

@@ -116,7 +116,14 @@ def _check_header(path: Path, header: dict[str, Any]) -> None:
             f"{path}: a concept model of version {header.get('version')}, this program reads version {FORMAT_VERSION}: "
             "make it again with python -m reference"
         )
-    expected = {"object_id": str, "diameter_m": float, "labels": list, "backend": str, "fingerprint": str, "notes": dict}
+    expected = {
+        "object_id": str,
+        "diameter_m": float,
+        "labels": list,
+        "backend": str,
+        "fingerprint": str,
+        "notes": dict,
+    }
     for key, kind in expected.items():
         if not isinstance(header.get(key), kind):
             raise ModelError(f"{path}: the header's {key} is {header.get(key)!r}, expected a {kind.__name__}")

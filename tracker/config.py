@@ -9,6 +9,7 @@ import torch
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from tracker.closest_points import ClosestPointsConfig
 from tracker.cloud import CloudConfig
 from tracker.errors import ConfigError
 from tracker.matching import MatchingConfig
@@ -28,9 +29,9 @@ class TrackerConfig(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     prior: bool = True
-    accept: float = Field(0.25, ge=0, le=1)
-    trust: float = Field(0.6, ge=0, le=1)
-    verified: int = Field(5, ge=1, le=64)
+    accept: float = Field(default=0.25, ge=0, le=1)
+    trust: float = Field(default=0.6, ge=0, le=1)
+    verified: int = Field(default=5, ge=1, le=64)
     seed: int = 42
     device: str = "auto"
     view: ViewConfig = ViewConfig()
@@ -38,6 +39,7 @@ class TrackerConfig(BaseModel):
     matching: MatchingConfig = MatchingConfig()
     registration: RegistrationConfig = RegistrationConfig()
     verification: VerificationConfig = VerificationConfig()
+    closest_points: ClosestPointsConfig = ClosestPointsConfig()
     refinement: RefinementConfig = RefinementConfig()
     filter: FilterConfig = FilterConfig()
 

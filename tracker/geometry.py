@@ -93,6 +93,12 @@ class Pose:
             return Pose(self.rotation @ other.rotation, self.rotation @ other.translation_m + self.translation_m)
         return other @ self.rotation.T + self.translation_m
 
+    def nudged(self, motion: Floats) -> Pose:
+        """Turned by a rotation vector (first three, radians) and shifted (last three, metres), both in the axes of
+        `to`, the turn about the origin of `from`: the small motions that refinement and filter estimate."""
+        turn = Rotation.from_rotvec(motion[:3]).as_matrix()
+        return Pose(turn @ self.rotation, self.translation_m + motion[3:])
+
     def angle_to_rad(self, other: Pose) -> float:
         """Angle of the rotation between two poses, in [0, pi]."""
         return float(np.linalg.norm(Rotation.from_matrix(self.rotation.T @ other.rotation).as_rotvec()))
@@ -146,7 +152,7 @@ class Intrinsics:
         z = points_cam[:, 2]
         return np.stack((points_cam[:, 0] / z * self.fx + self.cx, points_cam[:, 1] / z * self.fy + self.cy), axis=1)
 
-    def unproject(self, columns: Floats, rows: Floats, depth_m: Floats) -> Floats:
+    def unproject(self, columns: npt.NDArray, rows: npt.NDArray, depth_m: Floats) -> Floats:
         """Pixels and their z in metres, each (N,) -> points (N, 3) in camera coordinates."""
         x_m, y_m = (columns - self.cx) / self.fx * depth_m, (rows - self.cy) / self.fy * depth_m
         return np.stack((x_m, y_m, depth_m), axis=1)

@@ -21,9 +21,9 @@ class MatchingConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    temperature: float = Field(0.3, gt=0)
-    query_points: int = Field(1500, ge=50, le=10_000)
-    memory_mb: float = Field(64.0, ge=1)
+    temperature: float = Field(default=0.3, gt=0)
+    query_points: int = Field(default=1500, ge=50, le=10_000)
+    memory_mb: float = Field(default=64.0, ge=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

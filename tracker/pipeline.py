@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import torch
 
 from tracker.appearance import ViewAppearance, view_appearance
+from tracker.closest_points import ClosestPoints
 from tracker.cloud import LEAST_POINTS, PointCloud, lift
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError, FrameError
 from tracker.frame import Frame
 from tracker.geometry import Pose
-from tracker.matching import Matcher
+from tracker.matching import Correspondences, Matcher
 from tracker.pose_filter import PoseFilter
 from tracker.refinement import Refined, Refiner
 from tracker.registration import register
@@ -87,6 +88,7 @@ class _Track:
         self._model, self._config, self._backend = model, config, backend
         self._device = config.torch_device
         self._match = Matcher(model, config.matching, self._device)
+        self._closest = ClosestPoints(model, config.closest_points)
         self._refine = Refiner(model, config.refinement, config.view.pixels_across)
         self._verify = Verifier(model, config.verification, config.view.pixels_across)
         self._filter = PoseFilter(config.filter)
@@ -100,13 +102,14 @@ class _Track:
         if isinstance(sight, str):
             return self._lost(frame, sight, clock)
 
-        # 2. Is it where it was expected?
-        found = self._from_prediction(frame, sight, clock)
+        # 2. Which of its points is which point of the model?
+        with clock("matching"):
+            correspondences = self._match(sight.cloud)
 
-        # 3. If not clearly so, where else could it be?
+        # 3. Is it where it was expected? If not clearly so: where do the correspondences agree that it is?
+        found = self._expected(frame, sight, correspondences, clock)
         if found is None or found.evidence.score < self._config.trust:
-            elsewhere = self._from_anywhere(sight, clock)
-            found = max((h for h in (found, elsewhere) if h), key=lambda h: h.evidence.score, default=None)
+            found = _better(found, self._searched(sight, correspondences, clock))
         if found is None or found.evidence.score < self._config.accept:
             score = found.evidence.score if found else 0.0
             return self._lost(frame, f"poor fit: the best pose explains {score:.2f} of what should be seen", clock)
@@ -134,46 +137,56 @@ class _Track:
             return f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
         return _Sight(view, cloud, appearance)
 
-    def _from_prediction(self, frame: Frame, sight: _Sight, clock: Stopwatch) -> _Hypothesis | None:
+    def _expected(
+        self, frame: Frame, sight: _Sight, correspondences: Correspondences, clock: Stopwatch
+    ) -> _Hypothesis | None:
+        """The better of two poses near the prediction: by surfaces alone, and pulled by the concepts first."""
         predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
         if predicted is None:
             return None
-        with clock("matching"):
-            correspondences = self._match(sight.cloud)
-        with clock("refinement"):
-            a = self._refined(predicted, sight, "prediction")
-            b = self._refined(self._refine.pull(predicted, correspondences, sight.cloud), sight, "pull")
-            return max((h for h in (a, b) if h), key=lambda h: h.evidence.score, default=None)
+        with clock("closest points"):
+            pulled = self._closest.align(self._closest.pull(predicted, correspondences, sight.cloud), sight.cloud)
+            direct = self._closest.align(predicted, sight.cloud)
+        found = self._refined(pulled, sight, "concepts", clock)
+        if direct and pulled and self._alike(direct, pulled):
+            return found
+        return _better(self._refined(direct, sight, "prediction", clock), found)
 
-    def _from_anywhere(self, sight: _Sight, clock: Stopwatch) -> _Hypothesis | None:
-        """The best of the poses on which concept correspondences agree."""
-        with clock("matching"):
-            correspondences = self._match(sight.cloud)
+    def _alike(self, a: Pose, b: Pose) -> bool:
+        """So near that refinement brings them to the same pose."""
+        return a.angle_to_rad(b) < 0.03 and a.distance_to_m(b) < 0.01 * self._model.diameter_m
+
+    def _searched(self, sight: _Sight, correspondences: Correspondences, clock: Stopwatch) -> _Hypothesis | None:
+        """The best of the poses on which correspondences agree, wherever that is."""
         with clock("registration"):
             generator = torch.Generator(self._device).manual_seed(self._config.seed)
             candidates = register(correspondences, sight.cloud, self._model, self._config.registration, generator)
         with clock("verification"):
             rough = [(self._verify(c.T_cam_obj, sight.view, sight.appearance).score, c) for c in candidates]
             rough.sort(key=lambda scored: -scored[0])
-        with clock("refinement"):
-            refined = [self._refined(c.T_cam_obj, sight, "search") for _, c in rough[: self._config.verified]]
-        return max((h for h in refined if h), key=lambda h: h.evidence.score, default=None)
+        best = None
+        for _, candidate in rough[: self._config.verified]:
+            with clock("closest points"):
+                closer = self._closest.align(candidate.T_cam_obj, sight.cloud)
+            best = _better(best, self._refined(closer, sight, "search", clock))
+        return best
 
-    def _refined(self, T_start: Pose, sight: _Sight, origin: str) -> _Hypothesis | None:
-        refined = self._refine(T_start, sight.cloud, sight.view, sight.appearance)
+    def _refined(self, T_start: Pose | None, sight: _Sight, origin: str, clock: Stopwatch) -> _Hypothesis | None:
+        if T_start is None:
+            return None
+        with clock("refinement"):
+            refined = self._refine(T_start, sight.view, sight.appearance)
         if refined is None:
             return None
-        return _Hypothesis(refined, self._verify(refined.T_cam_obj, sight.view, sight.appearance), origin)
+        with clock("verification"):
+            return _Hypothesis(refined, self._verify(refined.T_cam_obj, sight.view, sight.appearance), origin)
 
     def _tracked(self, frame: Frame, found: _Hypothesis, clock: Stopwatch) -> TrackResult:
         raw, information = found.refined.T_cam_obj, found.refined.information
         with clock("filter"):
-            if not self._config.prior or self._filter.predict(frame.stamp_ns) is None:
+            filtered = self._filter.update(raw, information, frame.stamp_ns) if self._config.prior else None
+            if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
                 filtered = self._filter.start(raw, information, frame.stamp_ns)
-            else:
-                filtered = self._filter.update(raw, information, frame.stamp_ns)
-                if not filtered.within_gate:  # verified all the same, so the motion model was wrong, not the pose
-                    filtered = self._filter.start(raw, information, frame.stamp_ns)
         self._state = TrackState.TRACKING
         return TrackResult(
             stamp_ns=frame.stamp_ns,
@@ -204,3 +217,10 @@ class _Track:
             evidence=None,
             timings_ms=clock.timings_ms(),
         )
+
+
+def _better(a: _Hypothesis | None, b: _Hypothesis | None) -> _Hypothesis | None:
+    """The one with the higher score, the first of equals."""
+    if a is None or b is None:
+        return a or b
+    return a if a.evidence.score >= b.evidence.score else b

@@ -28,12 +28,12 @@ class FilterConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    acceleration_mps2: float = Field(5.0, gt=0)
-    acceleration_radps2: float = Field(30.0, gt=0)
-    gate: float = Field(0.9999, gt=0, lt=1)
-    least_sigma_m: float = Field(0.0003, gt=0)
-    least_sigma_rad: float = Field(0.003, gt=0)
-    longest_gap_s: float = Field(0.5, gt=0)
+    acceleration_mps2: float = Field(default=5.0, gt=0)
+    acceleration_radps2: float = Field(default=30.0, gt=0)
+    gate: float = Field(default=0.9999, gt=0, lt=1)
+    least_sigma_m: float = Field(default=0.0003, gt=0)
+    least_sigma_rad: float = Field(default=0.003, gt=0)
+    longest_gap_s: float = Field(default=0.5, gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,20 +71,22 @@ class PoseFilter:
         self._pose = None
 
     def predict(self, stamp_ns: int) -> Pose | None:
-        """The pose expected at a time, None before the start. Does not change the filter."""
-        if self._pose is None:
-            return None
-        return _moved(self._pose, self._kalman.x[6:, 0] * self._step_s(stamp_ns))
+        """The pose expected at a time, None before the start. After a long gap: where it was. Changes nothing."""
+        step_s = self._step_s(stamp_ns)
+        if self._pose is None or step_s is None:
+            return self._pose
+        return self._pose.nudged(self._kalman.x[6:, 0] * step_s)
 
     def update(self, T_cam_obj: Pose, information: Floats, stamp_ns: int) -> Filtered:
-        """Take in a measurement and its (6, 6) information. One outside the gate leaves the filter as it was."""
-        predicted = self.predict(stamp_ns)
-        assert predicted is not None, "start the filter before updating it"
-        step_s = self._step_s(stamp_ns)
+        """Take in a measurement and its (6, 6) information; the first, and one after a long gap, starts the filter.
+
+        A measurement outside the gate leaves the filter as it was.
+        """
+        predicted, step_s = self.predict(stamp_ns), self._step_s(stamp_ns)
+        if predicted is None or step_s is None:
+            return self.start(T_cam_obj, information, stamp_ns)
         x, P = self._kalman.x.copy(), self._kalman.P.copy()
-        self._kalman.F = np.eye(12) + np.eye(12, k=6) * step_s
-        self._kalman.Q = self._process_noise(step_s)
-        self._kalman.predict()
+        self._kalman.predict(F=np.eye(12) + np.eye(12, k=6) * step_s, Q=self._process_noise(step_s))
         self._kalman.x[:6] = 0  # the deviation from `predicted`, which has moved by the velocity already
         innovation = np.concatenate(
             (
@@ -98,13 +100,14 @@ class PoseFilter:
             self._kalman.x, self._kalman.P = x, P
             return Filtered(predicted, P[:6, :6].copy(), squared, False)
         self._kalman.update(innovation, R=noise)
-        self._pose, self._stamp_ns = _moved(predicted, self._kalman.x[:6, 0]), stamp_ns
+        self._pose, self._stamp_ns = predicted.nudged(self._kalman.x[:6, 0]), stamp_ns
         self._kalman.x[:6] = 0
         return Filtered(self._pose, self._kalman.P[:6, :6].copy(), squared, True)
 
-    def _step_s(self, stamp_ns: int) -> float:
+    def _step_s(self, stamp_ns: int) -> float | None:
+        """Seconds since the last measurement that was used, None where they are too many."""
         step_s = (stamp_ns - self._stamp_ns) / 1e9
-        return step_s if step_s <= self._config.longest_gap_s else 0.0
+        return step_s if step_s <= self._config.longest_gap_s else None
 
     def _measurement_covariance(self, information: Floats) -> Floats:
         """Inverse of the information, no direction more certain than the least sigmas nor less than a free one."""
@@ -112,17 +115,11 @@ class PoseFilter:
         scaled = information * np.outer(least, least)  # 1 = as certain as the least sigma
         values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
         variances = 1 + 1 / np.maximum(values, 1e-6)
-        return (vectors * variances) @ vectors.T * np.outer(least, least)
+        return np.asarray((vectors * variances) @ vectors.T * np.outer(least, least), np.float64)
 
     def _process_noise(self, step_s: float) -> Floats:
         """Discrete white acceleration over a step (Bar-Shalom et al., Estimation with Applications, 2001, 6.3.2)."""
         config = self._config
         variance = np.diag([config.acceleration_radps2**2] * 3 + [config.acceleration_mps2**2] * 3)
         gain = np.array([[step_s**4 / 4, step_s**3 / 2], [step_s**3 / 2, step_s**2]])
-        return np.kron(gain, variance)
-
-
-def _moved(pose: Pose, deviation: Floats) -> Pose:
-    """A pose turned and shifted by (6,) in camera axes about the object's origin."""
-    turn = Rotation.from_rotvec(deviation[:3]).as_matrix()
-    return Pose(turn @ pose.rotation, pose.translation_m + deviation[3:])
+        return np.asarray(np.kron(gain, variance), np.float64)

@@ -31,16 +31,16 @@ class RegistrationConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    samples: int = Field(100_000, ge=1)
-    threshold_m: float = Field(0.01, gt=0)
-    shortest_edge: float = Field(0.12, ge=0, lt=1)
-    normal_cosine: float = Field(0.4, gt=0, le=2)
-    solved: int = Field(4000, ge=1)
-    scored_points: int = Field(300, ge=10)
-    refitted: int = Field(300, ge=1)
-    candidates: int = Field(12, ge=1)
-    distinct_rad: float = Field(0.2, gt=0)
-    distinct_share: float = Field(0.12, gt=0)
+    samples: int = Field(default=100_000, ge=1)
+    threshold_m: float = Field(default=0.01, gt=0)
+    shortest_edge: float = Field(default=0.12, ge=0, lt=1)
+    normal_cosine: float = Field(default=0.4, gt=0, le=2)
+    solved: int = Field(default=4000, ge=1)
+    scored_points: int = Field(default=300, ge=10)
+    refitted: int = Field(default=300, ge=1)
+    candidates: int = Field(default=12, ge=1)
+    distinct_rad: float = Field(default=0.2, gt=0)
+    distinct_share: float = Field(default=0.12, gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,8 +164,7 @@ def _refit(
         translation = torch.where(enough[:, None], fitted_translation, translation)
     share = inliers.mean(dim=1).cpu().numpy()
     poses = [
-        Pose(r, t)
-        for r, t in zip(rotation.double().cpu().numpy(), translation.double().cpu().numpy(), strict=True)
+        Pose(r, t) for r, t in zip(rotation.double().cpu().numpy(), translation.double().cpu().numpy(), strict=True)
     ]
     found = [Candidate(pose, float(s)) for pose, s in zip(poses, share, strict=True)]
     return sorted(found, key=lambda c: -c.inlier_share)

@@ -21,11 +21,11 @@ class VerificationConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    model_points: int = Field(1000, ge=50)
-    depth_sigma: float = Field(0.03, gt=0)
-    depth_sigma_least_m: float = Field(0.003, gt=0)
-    lab_sigma: float = Field(14.0, gt=0)
-    colour_share: float = Field(0.7, ge=0, le=1)
+    model_points: int = Field(default=1000, ge=50)
+    depth_sigma: float = Field(default=0.03, gt=0)
+    depth_sigma_least_m: float = Field(default=0.003, gt=0)
+    lab_sigma: float = Field(default=14.0, gt=0)
+    colour_share: float = Field(default=0.7, ge=0, le=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ class Verifier:
         )
 
     def _colour_agreement(self, lab: np.ndarray, in_place: np.ndarray) -> np.ndarray:
-        """(N,) in [0, 1], after the offset that all points share (exposure, white balance) is taken off and punished."""
+        """(N,) in [0, 1]; an offset that all points share (exposure, white balance) is taken off and costs a little."""
         if in_place.sum() < 20:
             return np.zeros(len(lab))
         offset = np.median((lab - self._lab)[in_place], axis=0)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
 
 from tracker.frame import Frame, Mask
-from tracker.geometry import Intrinsics
+from tracker.geometry import Floats, Intrinsics
 
 Float32s = npt.NDArray[np.float32]
 
@@ -27,7 +27,7 @@ class ViewConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    pixels_across: int = Field(64, ge=8, le=512)
+    pixels_across: int = Field(default=64, ge=8, le=512)
 
 
 class Box(NamedTuple):
@@ -63,6 +63,11 @@ class ObjectView:
     def has_depth(self) -> Mask:
         """(h, w) bool, the object's pixels that have a 3D point."""
         return self.inside & (self.depth_m > 0)
+
+    def points(self) -> Floats:
+        """(N, 3) points in camera coordinates, metres, of the pixels that have depth, row by row."""
+        rows, columns = np.nonzero(self.has_depth)
+        return self.camera.unproject(columns, rows, self.depth_m[rows, columns].astype(np.float64))
 
 
 def bounding_box(mask: Mask) -> Box | None:
@@ -115,7 +120,7 @@ def _pool_colour(rgb: npt.NDArray[np.uint8], inside: Mask, block: int) -> tuple[
     weights = inside.astype(np.float32)
     share = _block_mean(weights, block)
     total = _block_mean(rgb * weights[:, :, None], block)
-    return total / np.maximum(share, 1e-6)[:, :, None], share
+    return np.asarray(total / np.maximum(share, 1e-6)[:, :, None], np.float32), share
 
 
 def _pool_depth(depth_m: Float32s, measured: Mask, block: int, tolerance_m: float) -> Float32s:
@@ -144,4 +149,5 @@ def _blocks(array: npt.NDArray, block: int) -> npt.NDArray:
 def _block_mean(array: Float32s, block: int) -> Float32s:
     """Mean of every block of (H, W) or (H, W, C), missing pixels counted as zero."""
     rows = np.add.reduceat(array, np.arange(0, array.shape[0], block), axis=0)
-    return np.add.reduceat(rows, np.arange(0, array.shape[1], block), axis=1) / np.float32(block * block)
+    total = np.add.reduceat(rows, np.arange(0, array.shape[1], block), axis=1)
+    return np.asarray(total / (block * block), np.float32)

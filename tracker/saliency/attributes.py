@@ -40,7 +40,9 @@ RELATIVE_FULL = 25.0  # Lab units of difference at which a relative term is full
 SURFACE_TERMS = ("flat", "curved", "convex edge", "rim")
 SURFACE_WEIGHT = 0.5  # depth is noisier than colour, so its terms say less
 EDGE_SCALE, FORM_SCALE = 0.04, 0.10
-BEND_FULL = 0.12  # loss of length of the mean normal at which a surface counts as fully bent (about 50 degrees of spread)
+BEND_FULL = (
+    0.12  # loss of length of the mean normal at which a surface counts as fully bent (about 50 degrees of spread)
+)
 
 
 class Attributes:
@@ -63,8 +65,7 @@ class Attributes:
 
     def _maps(self, view: ObjectView) -> Saliency:
         weights = view.inside.astype(np.float32)
-        lab = cv2.cvtColor(view.rgb / np.float32(255), cv2.COLOR_RGB2Lab)
-        lab = smooth_inside(lab, weights, 0.7)  # pixel noise is not a concept
+        lab = smooth_inside(lab_of(view.rgb), weights, 0.7)  # pixel noise is not a concept
         maps = np.concatenate(
             (
                 _colour_maps(lab, weights, view.pixels_across),
@@ -76,11 +77,16 @@ class Attributes:
         return Saliency(self.labels, np.ascontiguousarray(np.moveaxis(maps * weights[:, :, None], 2, 0)), view.box)
 
 
+def lab_of(rgb: Float32s) -> Float32s:
+    """(h, w, 3) float32 RGB in [0, 255] -> CIE L*a*b* (D65), L in [0, 100]."""
+    return np.asarray(cv2.cvtColor(rgb / np.float32(255), cv2.COLOR_RGB2Lab), np.float32)
+
+
 def smooth_inside(values: Float32s, weights: Float32s, sigma_px: float) -> Float32s:
     """Gaussian smoothing of (h, w, C) values in which only pixels with weight (h, w) take part."""
     total = cv2.GaussianBlur(values * weights[:, :, None], (0, 0), sigma_px)
     share = cv2.GaussianBlur(weights, (0, 0), sigma_px)
-    return total.reshape(values.shape) / np.maximum(share, 1e-3)[:, :, None]
+    return np.asarray(total.reshape(values.shape) / np.maximum(share, 1e-3)[:, :, None], np.float32)
 
 
 def _colour_maps(lab: Float32s, weights: Float32s, pixels_across: float) -> Float32s:

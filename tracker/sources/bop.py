@@ -99,9 +99,7 @@ class BopScene:
             if info is None:
                 visible_px = int(self._read_mask("mask_visib", image_id, place).sum())
                 return Sighting(index, Pose.from_matrix(T_cam_obj), visible_px, 1.0 if visible_px else 0.0)
-            return Sighting(
-                index, Pose.from_matrix(T_cam_obj), int(info["px_count_visib"]), float(info["visib_fract"])
-            )
+            return Sighting(index, Pose.from_matrix(T_cam_obj), int(info["px_count_visib"]), float(info["visib_fract"]))
         except (KeyError, IndexError, TypeError, ValueError, FrameError) as error:
             raise SourceError(f"{self._folder}/scene_gt.json: image {image_id}, object {object_id}: {error}") from error
 

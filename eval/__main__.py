@@ -1,0 +1,156 @@
+"""`python -m eval track` runs the tracker on a dataset and scores it, `score` scores anybody's BOP result file."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from tracker.terminal import STDERR, progress, run
+
+if TYPE_CHECKING:
+    from tracker.concept import ConceptModel
+    from tracker.viewer import Viewer
+
+
+@dataclass
+class Track:
+    """Make few-shot models from each scene's own frames, track all its frames in order, and score the poses."""
+
+    dataset: str
+    """bop:PATH or synthetic:NAME."""
+    scenes: tuple[int, ...] | None = None
+    """Only these scenes."""
+    objects: tuple[str, ...] | None = None
+    """Only these objects."""
+    backend: str = "attributes"
+    """Which saliency backend finds the concepts."""
+    views: int = 2
+    """Reference frames an object and scene; they are not scored."""
+    masks: Literal["visib"] = "visib"
+    """Where the object's pixels come from: the dataset's masks of what can be seen."""
+    prior: Literal["on", "off"] | None = None
+    """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
+    poses: Literal["filtered", "raw"] = "filtered"
+    """Which poses are scored: after the filter, or of each frame alone."""
+    config: Path | None = None
+    """YAML file with settings that differ from the defaults."""
+    out: Path | None = None
+    """Folder for scores.json, results.csv, report.html, config.yaml and what --view makes."""
+    view: Literal["none", "overlay"] = "none"
+    """overlay: write overlay.mp4 to the --out folder (one for each of several scenes)."""
+    overwrite: bool = False
+    """Replace results that are in the --out folder."""
+
+    def __call__(self) -> None:
+        from contextlib import ExitStack
+
+        from eval.bop_results import write_results
+        from eval.datasets import open_dataset
+        from eval.predict import Protocol, track_dataset
+        from eval.report import environment, table, write_html, write_scores
+        from eval.score import score
+        from tracker.config import dump_config, read_config
+        from tracker.errors import ConfigError
+        from tracker.output import result_folder
+        from tracker.saliency import open_backend
+        from tracker.viewer import NullViewer, OverlayVideo
+
+        if self.view != "none" and self.out is None:
+            raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
+        if self.views < 1:
+            raise ConfigError(f"--views: at least one reference frame is needed, got {self.views}")
+        config = read_config(self.config)
+        if self.prior is not None:
+            config = config.model_copy(update={"prior": self.prior == "on"})
+        dataset = open_dataset(self.dataset)
+        protocol = Protocol(open_backend(self.backend), config, self.views, self.poses)
+        scene_ids = dataset.scene_ids if self.scenes is None else self.scenes
+        with ExitStack() as stack:
+            folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
+
+            def viewer(scene_id: int, models: Sequence[ConceptModel]) -> Viewer:
+                if folder is None or self.view == "none":
+                    return NullViewer()
+                name = "overlay.mp4" if len(scene_ids) == 1 else f"overlay_{scene_id:06d}.mp4"
+                return OverlayVideo(folder / name, models)
+
+            tracked = track_dataset(dataset, protocol, scene_ids, self.objects, viewer, progress)
+            scores = score(
+                dataset,
+                tracked.estimates,
+                scene_ids=scene_ids,
+                object_ids=self.objects,
+                exclude=tracked.reference_frames,
+                protocol={
+                    "backend": f"{protocol.backend.name} ({protocol.backend.fingerprint})",
+                    "views": self.views,
+                    "masks": "the dataset's visible masks",
+                    "prior": "on" if config.prior else "off",
+                    "initialisation": "estimated: no true pose is given after onboarding",
+                    "reinitialisation": "by the tracker itself, never from the truth",
+                    "poses": self.poses,
+                    "models_refused": tracked.refused,
+                },
+                tracking=tracked.counts,
+            )
+            latency_ms = tracked.latency_ms()
+            if folder:
+                extra = {"latency_ms": latency_ms, "environment": environment()}
+                write_results(folder / "results.csv", tracked.estimates)
+                write_scores(folder / "scores.json", scores, extra)
+                write_html(folder / "report.html", scores, extra, f"Tracking {self.dataset}")
+                (folder / "config.yaml").write_text(dump_config(config))
+        STDERR.print(table(scores, f"{self.dataset}, {self.views} views, backend {self.backend}"))
+        if latency_ms:
+            STDERR.print(f"an object and frame: median {latency_ms['median']:.1f} ms, p95 {latency_ms['p95']:.1f} ms")
+        if self.out:
+            STDERR.print(f"written to {self.out}")
+
+
+@dataclass
+class Score:
+    """Score a BOP result file."""
+
+    dataset: str
+    """bop:PATH or synthetic:NAME."""
+    results: Path
+    """The csv: scene_id,im_id,obj_id,score,R,t,time."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File for the scores, for example scores.json; a page of the same name is written beside it."""
+    scenes: tuple[int, ...] | None = None
+    """Only these scenes."""
+    objects: tuple[str, ...] | None = None
+    """Only these objects."""
+    overwrite: bool = False
+    """Replace the file if it exists."""
+
+    def __call__(self) -> None:
+        from eval.datasets import open_dataset
+        from eval.report import environment, table, write_html, write_scores
+        from eval.score import score_results_file
+        from tracker.output import require_free
+
+        if self.out:
+            require_free(self.out, self.overwrite)
+        dataset = open_dataset(self.dataset)
+        scores = score_results_file(dataset, self.results, scene_ids=self.scenes, object_ids=self.objects)
+        if self.out:
+            self.out.parent.mkdir(parents=True, exist_ok=True)
+            write_html(self.out.with_suffix(".html"), scores, {"environment": environment()}, f"{self.results}")
+            write_scores(self.out, scores, {"environment": environment()})
+        STDERR.print(table(scores, f"{self.results} on {self.dataset}"))
+
+
+def main() -> None:
+    run(
+        tyro.extras.subcommand_cli_from_dict({"track": Track, "score": Score}, prog="python -m eval", args=sys.argv[1:])
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,152 @@
+"""Loop 1 of an evaluation: run the tracker over a dataset and keep what it said. It sees frames, never the truth."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from eval.bop_results import Estimate
+from eval.datasets import Dataset
+from eval.instances import ObjectInImage
+from eval.score import TrackingCounts
+from reference.onboard import onboard, read_reference_frames
+from tracker.concept import ConceptModel
+from tracker.config import TrackerConfig
+from tracker.errors import OnboardingError
+from tracker.frame import Frame
+from tracker.geometry import Pose
+from tracker.pipeline import ObjectTracker
+from tracker.result import TrackResult, TrackState
+from tracker.saliency import SaliencyBackend
+from tracker.sources import PosedSource
+from tracker.viewer import NullViewer, Viewer
+
+log = logging.getLogger(__name__)
+
+Progress = Callable[[Iterable[Frame], int, str], Iterable[Frame]]
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """How a dataset is tracked. views: reference frames an object and scene, picked from its own frames.
+    poses: which of a result's poses count."""
+
+    backend: SaliencyBackend
+    config: TrackerConfig
+    views: int
+    poses: Literal["filtered", "raw"] = "filtered"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracked:
+    """estimates: one for every frame and object with a pose. reference_frames: those that models were made of.
+    counts: by object. timings_ms: of every step, stage -> milliseconds. refused: "scene/object" -> why no model could
+    be made of it; its poses are missing."""
+
+    estimates: list[Estimate] = field(default_factory=list)
+    reference_frames: set[ObjectInImage] = field(default_factory=set)
+    counts: dict[str, TrackingCounts] = field(default_factory=dict)
+    timings_ms: list[dict[str, float]] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+
+    def latency_ms(self) -> dict[str, object]:
+        """Median and 95th percentile of an object's whole step, and the median of every stage where it ran."""
+        if not self.timings_ms:
+            return {}
+        totals = [timings["total"] for timings in self.timings_ms]
+        stages = sorted({stage for timings in self.timings_ms for stage in timings} - {"total"})
+        medians = {s: float(np.median([t[s] for t in self.timings_ms if s in t])) for s in stages}
+        return {"median": float(np.median(totals)), "p95": float(np.percentile(totals, 95)), "stages": medians}
+
+
+def track_dataset(
+    dataset: Dataset,
+    protocol: Protocol,
+    scene_ids: Sequence[int] | None = None,
+    object_ids: Sequence[str] | None = None,
+    viewer: Callable[[int, Sequence[ConceptModel]], Viewer] = lambda scene_id, models: NullViewer(),  # noqa: ARG005
+    progress: Progress = lambda frames, total, what: frames,  # noqa: ARG005
+) -> Tracked:
+    """Onboard every object of every scene (all unless given), then track it through all the frames in order.
+
+    viewer: makes one a scene. Raises SourceError where the dataset does not have what is asked for.
+    """
+    tracked = Tracked()
+    for scene_id in dataset.scene_ids if scene_ids is None else scene_ids:
+        source = dataset.scene(scene_id)
+        wanted = [o for o in source.object_ids if object_ids is None or o in object_ids]
+        models = _onboard(dataset, scene_id, wanted, protocol, tracked)
+        if not models:
+            continue
+        tracker = ObjectTracker(models, protocol.config, protocol.backend)
+        truth, visible = _truth(source, [model.object_id for model in models])
+        shown = viewer(scene_id, models)
+        try:
+            for frame in progress(source, len(source), f"scene {scene_id}"):
+                results = tracker.step(frame)
+                shown.show(frame, results, truth[frame.index])
+                seen = [(frame.index, result.object_id) in visible for result in results]
+                _record(tracked, dataset, scene_id, frame.index, results, seen, protocol)
+        finally:
+            shown.close()
+    return tracked
+
+
+def _onboard(
+    dataset: Dataset, scene_id: int, object_ids: Sequence[str], protocol: Protocol, tracked: Tracked
+) -> list[ConceptModel]:
+    """Models of the objects of which one can be made; the others are noted in `tracked.refused`."""
+    models = []
+    config = protocol.config
+    for object_id in object_ids:
+        try:
+            frames = read_reference_frames(dataset.scene(scene_id), object_id, protocol.views)
+            models.append(onboard(frames, protocol.backend, config.view, config.cloud))
+        except OnboardingError as error:
+            log.warning("scene %d: %s", scene_id, error)
+            tracked.refused[f"{scene_id}/{object_id}"] = str(error)
+            continue
+        image_ids = dataset.image_ids(scene_id)
+        tracked.reference_frames.update((scene_id, object_id, image_ids[f.frame.index]) for f in frames)
+    return models
+
+
+def _truth(source: PosedSource, object_ids: Sequence[str]) -> tuple[list[dict[str, Pose]], set[tuple[int, str]]]:
+    """By frame the true poses of the objects, for the viewer; and (frame, object) where a pixel of it can be seen."""
+    poses: list[dict[str, Pose]] = [{} for _ in range(len(source))]
+    visible = set()
+    for object_id in object_ids:
+        for sighting in source.sightings(object_id):
+            poses[sighting.index][object_id] = sighting.T_cam_obj
+            if sighting.visible_px > 0:
+                visible.add((sighting.index, object_id))
+    return poses, visible
+
+
+def _record(
+    tracked: Tracked,
+    dataset: Dataset,
+    scene_id: int,
+    index: int,
+    results: Sequence[TrackResult],
+    seen: Sequence[bool],
+    protocol: Protocol,
+) -> None:
+    image_id = dataset.image_ids(scene_id)[index]
+    time_s = sum(result.timings_ms["total"] for result in results) / 1000  # of the whole image, as BOP has it
+    for result, visible in zip(results, seen, strict=True):
+        tracked.timings_ms.append(result.timings_ms)
+        before = tracked.counts.get(result.object_id, TrackingCounts(0, 0, 0))
+        tracked.counts[result.object_id] = TrackingCounts(
+            frames=before.frames + 1,
+            lost=before.lost + (result.state is TrackState.LOST),
+            false_tracks=before.false_tracks + (result.pose is not None and not visible),
+        )
+        pose = result.pose if protocol.poses == "filtered" else result.raw_pose
+        if pose is not None:
+            number = dataset.number(result.object_id)
+            tracked.estimates.append(Estimate(scene_id, image_id, number, result.confidence, pose, time_s))

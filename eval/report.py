@@ -1,0 +1,128 @@
+"""Scores -> JSON, a table for the terminal, and a page that stands alone."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from html import escape
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+
+from eval.plots import error_curve, error_over_time
+from eval.score import Metrics, Scores
+
+# name in scores.json -> heading, digits
+COLUMNS = {
+    "add_auc": ("ADD-AUC", 1),
+    "adds_auc": ("ADD-S-AUC", 1),
+    "add_auc_2cm": ("ADD 2 cm", 1),
+    "adds_auc_2cm": ("ADD-S 2 cm", 1),
+    "over_1cm": ("> 1 cm, %", 1),
+    "instances": ("instances", 0),
+    "missing": ("missing", 0),
+    "false_tracks": ("false tracks", 0),
+}
+PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")
+
+
+def environment() -> dict[str, str]:
+    """What the run ran on: machine and versions, so that a table can be made again."""
+    versions = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
+    for package in PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "not installed as a package"
+    return versions
+
+
+def write_scores(path: Path, scores: Scores, extra: Mapping[str, object]) -> None:
+    """scores.json: protocol and metrics, and beside them what the caller adds."""
+    path.write_text(json.dumps({**scores.as_json(), **extra}, indent=1, allow_nan=False) + "\n")
+
+
+def table(scores: Scores, title: str) -> Table:
+    """One row an object, the mean of objects, and all instances pooled."""
+    out = Table(title=title)
+    for heading in ("object", *(heading for heading, _ in COLUMNS.values())):
+        out.add_column(heading, justify="left" if heading == "object" else "right")
+    for name, metrics in scores.per_object.items():
+        out.add_row(name, *_cells(metrics))
+    out.add_section()
+    out.add_row("mean of objects", *_cells(scores.mean_of_objects))
+    out.add_row("pooled", *_cells(scores.pooled), style="bold")
+    return out
+
+
+def write_html(path: Path, scores: Scores, extra: Mapping[str, object], title: str) -> None:
+    """report.html: tables, curves and the whole protocol in one file without a script or a link."""
+    rows = [_row(name, metrics) for name, metrics in scores.per_object.items()]
+    rows += [_row("mean of objects", scores.mean_of_objects), _row("pooled", scores.pooled)]
+    headings = "".join(f"<th>{escape(h)}</th>" for h in ("object", *(heading for heading, _ in COLUMNS.values())))
+    errors = {
+        "ADD": np.array([row.add_m for row in scores.instances]),
+        "ADD-S": np.array([row.adds_m for row in scores.instances]),
+    }
+    sections = [
+        f"<h1>{escape(title)}</h1>",
+        f"<div class=wide><table><thead><tr>{headings}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>",
+        "<p>ADD-AUC and ADD-S-AUC up to 10 cm and up to 2 cm, in percent (VOCap integration). Higher is better, "
+        "but for “&gt; 1 cm”, the share of instances whose ADD is over one centimetre, and for the counts.</p>",
+        "<h2>How large are the errors?</h2>",
+        error_curve(errors),
+        "<h2>When do they happen?</h2>",
+        error_over_time(scores.instances),
+        "<h2>Protocol</h2>",
+        _definitions(scores.protocol),
+        *(f"<h2>{escape(name.replace('_', ' ').capitalize())}</h2>{_definitions(value)}"
+          for name, value in extra.items() if isinstance(value, Mapping)),
+    ]  # fmt: skip
+    path.write_text(PAGE.format(title=escape(title), body="\n".join(sections)), encoding="utf-8")
+
+
+def _cells(metrics: Metrics) -> list[str]:
+    return [f"{metrics[name]:.{digits}f}" if name in metrics else "-" for name, (_, digits) in COLUMNS.items()]
+
+
+def _row(name: str, metrics: Metrics) -> str:
+    strong = ' class="total"' if name in ("pooled", "mean of objects") else ""
+    return f"<tr{strong}><td>{escape(name)}</td>{''.join(f'<td>{cell}</td>' for cell in _cells(metrics))}</tr>"
+
+
+def _definitions(values: Mapping[str, object]) -> str:
+    def text(value: object) -> str:
+        if isinstance(value, Mapping):
+            return ", ".join(f"{k}: {text(v)}" for k, v in value.items()) or "-"
+        if isinstance(value, list | tuple):
+            return ", ".join(text(v) for v in value) or "-"
+        return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+    pairs = (f"<dt>{escape(str(k).replace('_', ' '))}</dt><dd>{escape(text(v))}</dd>" for k, v in values.items())
+    return f"<dl>{''.join(pairs)}</dl>"
+
+
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+:root {{ color-scheme: light dark; --ink: light-dark(#1a1a1a, #e8e8e8); --faint: light-dark(#d5d5d5, #444);
+  --paper: light-dark(#fff, #161616); --add: #d55e00; --adds: #0072b2; }}
+body {{ font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 62rem;
+  margin: 2rem auto; padding: 0 1rem; }}
+h1 {{ font-size: 1.5rem; }} h2 {{ font-size: 1.1rem; margin-top: 2rem; }}
+.wide {{ overflow-x: auto; }}
+table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
+th, td {{ padding: .25rem .7rem; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--faint); }}
+th:first-child, td:first-child {{ text-align: left; }} .total td {{ font-weight: 600; }}
+dl {{ display: grid; grid-template-columns: minmax(8rem, 14rem) 1fr; gap: .2rem 1rem; }}
+dt {{ opacity: .7; }} dd {{ margin: 0; overflow-wrap: anywhere; }}
+svg {{ max-width: 100%; height: auto; display: block; }}
+svg text {{ fill: var(--ink); font: 12px system-ui, sans-serif; }}
+</style></head><body>
+{body}
+</body></html>
+"""

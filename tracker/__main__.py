@@ -1,0 +1,112 @@
+"""`python -m tracker SOURCE --model FILE`: track objects through a source of frames."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from rich.table import Table
+
+from tracker.terminal import STDERR, progress, run
+
+
+@dataclass
+class Track:
+    """Track objects through frames, and say at every frame where they are, or that they are lost."""
+
+    source: tyro.conf.Positional[str]
+    """bop:PATH:SCENE, folder:PATH or synthetic:NAME."""
+    model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE"), tyro.conf.UseAppendAction]
+    """Concept model that python -m reference made; once for every object."""
+    out: Path | None = None
+    """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view makes."""
+    masks: Literal["given"] = "given"
+    """Where the object's pixels come from: given by the source."""
+    prior: Literal["on", "off"] | None = None
+    """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
+    config: Path | None = None
+    """YAML file with settings that differ from the defaults."""
+    view: Literal["none", "overlay"] = "none"
+    """overlay: write overlay.mp4 to the --out folder."""
+    overwrite: bool = False
+    """Replace results that are in the --out folder."""
+    json: bool = False
+    """Write the lines of poses.jsonl to the standard output as they come."""
+    quiet: bool = False
+    """No progress bar and no table."""
+
+    def __call__(self) -> None:
+        from tracker.concept import ConceptModel
+        from tracker.config import dump_config, read_config
+        from tracker.errors import ConfigError
+        from tracker.output import as_json_line, result_folder
+        from tracker.pipeline import ObjectTracker
+        from tracker.sources import open_source
+        from tracker.viewer import NullViewer, OverlayVideo
+
+        if self.view != "none" and self.out is None:
+            raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
+        config = read_config(self.config)
+        if self.prior is not None:
+            config = config.model_copy(update={"prior": self.prior == "on"})
+        models = [ConceptModel.load(path) for path in self.model]
+        tracker = ObjectTracker(models, config)
+        source = open_source(self.source)
+        summary = _Summary()
+        with ExitStack() as stack:
+            folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
+            lines = stack.enter_context((folder / "poses.jsonl").open("w")) if folder else None
+            viewer = OverlayVideo(folder / "overlay.mp4", models) if folder and self.view == "overlay" else NullViewer()
+            stack.callback(viewer.close)
+            if folder:
+                (folder / "config.yaml").write_text(dump_config(config))
+            frames = iter(source) if self.quiet or self.json else progress(source, len(source), "tracking")
+            try:
+                for frame in frames:
+                    results = tracker.step(frame)
+                    viewer.show(frame, results, {})
+                    for result in results:
+                        summary.add(result.object_id, result.state.value, result.timings_ms["total"])
+                        line = as_json_line(result, frame.index)
+                        if lines:
+                            lines.write(line + "\n")
+                        if self.json:
+                            print(line, flush=True)
+            except KeyboardInterrupt:
+                STDERR.print("stopped; what was tracked is kept")
+        if not self.quiet and not self.json:
+            STDERR.print(summary.table())
+
+
+@dataclass
+class _Summary:
+    """What is told at the end."""
+
+    states: Counter[tuple[str, str]] = field(default_factory=Counter)
+    times_ms: dict[str, list[float]] = field(default_factory=dict)
+
+    def add(self, object_id: str, state: str, total_ms: float) -> None:
+        self.states[object_id, state] += 1
+        self.times_ms.setdefault(object_id, []).append(total_ms)
+
+    def table(self) -> Table:
+        import numpy as np
+
+        table = Table("object", "frames", "tracking", "lost", "median ms", title="tracked")
+        for object_id, times_ms in self.times_ms.items():
+            tracking, lost = self.states[object_id, "tracking"], self.states[object_id, "lost"]
+            table.add_row(object_id, str(len(times_ms)), str(tracking), str(lost), f"{np.median(times_ms):.1f}")
+        return table
+
+
+def main() -> None:
+    run(tyro.cli(Track, prog="python -m tracker", args=sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    main()

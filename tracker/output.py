@@ -1,0 +1,74 @@
+"""Result folders that are whole or absent."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tracker.errors import OutputError
+from tracker.geometry import Pose
+from tracker.result import TrackResult
+
+
+@contextmanager
+def result_folder(path: str | Path, overwrite: bool) -> Iterator[Path]:
+    """A folder to write into, which takes the place of `path` when the block ends without an error.
+
+    Raises OutputError at once where `path` holds something already and `overwrite` is False.
+    """
+    path = Path(path).resolve()
+    require_free(path, overwrite)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        partial.mkdir(parents=True)
+        yield partial
+        if path.is_dir():
+            old = path.with_name(f".{path.name}.{os.getpid()}.old")
+            path.rename(old)
+            partial.rename(path)
+            shutil.rmtree(old)
+        else:
+            partial.rename(path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def require_free(path: Path, overwrite: bool) -> None:
+    """Raises OutputError where results would be overwritten without having been asked to."""
+    if path.is_file() and not overwrite:
+        raise OutputError(f"{path} exists already; give another name, or --overwrite")
+    if path.is_dir() and any(path.iterdir()) and not overwrite:
+        raise OutputError(f"{path} holds results already; give another folder, or --overwrite")
+
+
+def as_json_line(result: TrackResult, frame_index: int) -> str:
+    """One result as a line of JSON: metres, radians, nanoseconds, quaternions wxyz; null where there is no pose."""
+    evidence = result.evidence
+    return json.dumps(
+        {
+            "frame": frame_index,
+            "stamp_ns": result.stamp_ns,
+            "object": result.object_id,
+            "state": result.state.value,
+            "reason": result.reason,
+            "confidence": round(result.confidence, 4),
+            "T_cam_obj": _pose(result.pose),
+            "T_cam_obj_raw": _pose(result.raw_pose),
+            "covariance": None if result.covariance is None else result.covariance.tolist(),
+            "evidence": None if evidence is None else {k: round(getattr(evidence, k), 4) for k in evidence.__slots__},
+            "timings_ms": {stage: round(ms, 2) for stage, ms in result.timings_ms.items()},
+        }
+    )
+
+
+def _pose(pose: Pose | None) -> dict[str, Any] | None:
+    if pose is None:
+        return None
+    return {"quaternion_wxyz": pose.quaternion_wxyz.tolist(), "translation_m": pose.translation_m.tolist()}
