@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from eval.plots import error_curve, error_over_time
@@ -17,15 +18,19 @@ from eval.score import Metrics, Scores
 
 # name in scores.json -> heading, digits
 COLUMNS = {
-    "add_auc": ("ADD-AUC", 1),
-    "adds_auc": ("ADD-S-AUC", 1),
-    "add_auc_2cm": ("ADD 2 cm", 1),
-    "adds_auc_2cm": ("ADD-S 2 cm", 1),
-    "over_1cm": ("> 1 cm, %", 1),
-    "instances": ("instances", 0),
+    "add_auc": ("ADD", 1),
+    "adds_auc": ("ADD-S", 1),
+    "add_auc_2cm": ("ADD 2cm", 1),
+    "adds_auc_2cm": ("ADD-S 2cm", 1),
+    "over_1cm": ("> 1cm", 1),
+    "instances": ("n", 0),
     "missing": ("missing", 0),
-    "false_tracks": ("false tracks", 0),
+    "false_tracks": ("false", 0),
 }
+LEGEND = (
+    "ADD and ADD-S: area under the curve up to 10 cm and, 2cm, up to 2 cm, in percent (VOCap). > 1cm: percent of the "
+    "n instances with an ADD over 1 cm. missing: instances without a pose. false: poses of what cannot be seen."
+)
 PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")
 
 
@@ -47,9 +52,9 @@ def write_scores(path: Path, scores: Scores, extra: Mapping[str, object]) -> Non
 
 def table(scores: Scores, title: str) -> Table:
     """One row an object, the mean of objects, and all instances pooled."""
-    out = Table(title=title)
+    out = Table(title=title, caption=LEGEND, caption_justify="left", box=SIMPLE_HEAD, padding=(0, 1))
     for heading in ("object", *(heading for heading, _ in COLUMNS.values())):
-        out.add_column(heading, justify="left" if heading == "object" else "right")
+        out.add_column(heading, justify="left" if heading == "object" else "right", no_wrap=True)
     for name, metrics in scores.per_object.items():
         out.add_row(name, *_cells(metrics))
     out.add_section()
@@ -70,8 +75,7 @@ def write_html(path: Path, scores: Scores, extra: Mapping[str, object], title: s
     sections = [
         f"<h1>{escape(title)}</h1>",
         f"<div class=wide><table><thead><tr>{headings}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>",
-        "<p>ADD-AUC and ADD-S-AUC up to 10 cm and up to 2 cm, in percent (VOCap integration). Higher is better, "
-        "but for “&gt; 1 cm”, the share of instances whose ADD is over one centimetre, and for the counts.</p>",
+        f"<p>{escape(LEGEND)}</p>",
         "<h2>How large are the errors?</h2>",
         error_curve(errors),
         "<h2>When do they happen?</h2>",

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
+from reference.cross_check import cross_check, others_than
 from tracker.cloud import PointCloud
 from tracker.errors import OnboardingError
 from tracker.frame import PosedFrame
 from tracker.geometry import Floats
 from tracker.view import Float32s
 
-MASK_SLACK_PX = 6  # masks are ragged: only what lies farther outside than this counts as outside
 DEPTH_SLACK = 0.05  # of the diameter: surfaces nearer than this in depth are the same surface
 LEAST_COSINE = 0.1  # of the angle of incidence; flatter views of a point weigh as if at this
 
@@ -42,87 +41,79 @@ def diameter_of(points: Floats) -> float:
     return float(max(np.linalg.norm(corners - corner, axis=1).max() for corner in corners))
 
 
-def confirmed(points_obj: Floats, others: Sequence[PosedFrame], slack_m: float) -> npt.NDArray[np.bool_]:
-    """(N,) bool: no other reference frame denies that the point is of the object, or more confirm it than deny it.
-
-    A frame denies a point where it sees the point's surface, or through it, clearly outside its mask, or sees through
-    it inside. A frame in which the point is hidden says nothing. So a mask that takes in a piece of the table in one
-    frame does no harm where another frame's mask does not.
-    """
-    votes = np.zeros(len(points_obj), int)
-    for other in others:
-        camera, depth_m = other.frame.intrinsics, other.frame.depth_m
-        points_cam = other.T_cam_obj @ points_obj
-        pixels = np.rint(camera.project(points_cam)).astype(int)
-        x, y = np.clip(pixels[:, 0], 0, camera.width - 1), np.clip(pixels[:, 1], 0, camera.height - 1)
-        seen = (points_cam[:, 2] > 0) & (pixels[:, 0] == x) & (pixels[:, 1] == y) & (depth_m[y, x] > 0)
-        behind_m = depth_m[y, x] - points_cam[:, 2]
-        near_mask = cv2.dilate(other.mask.astype(np.uint8), np.ones((2 * MASK_SLACK_PX + 1,) * 2, np.uint8)) > 0
-        seen_through = seen & (behind_m > slack_m)
-        on_surface = seen & (np.abs(behind_m) <= slack_m)
-        votes += on_surface & other.mask[y, x]
-        votes -= seen_through | (on_surface & ~near_mask[y, x])
-    return votes >= 0
-
-
 def fuse(clouds: Sequence[PointCloud], frames: Sequence[PosedFrame], diameter_m: float, voxel_m: float) -> FusedPoints:
     """Join the views' clouds (camera coordinates), each with the frame that it is from, as means over voxels.
 
-    A point weighs by the cosine of its angle of incidence over its squared distance, as its share of the picture does.
+    Points that the other frames deny are left out. A point weighs by the cosine of its angle of incidence over its
+    squared distance, as its share of the picture does. The voxels stand in the first frame's camera, so that the model
+    does not depend on how the object's own axes were chosen.
     """
-    points, normals, weights, views = [], [], [], []
-    kept = []
-    for k, (cloud, frame) in enumerate(zip(clouds, frames, strict=True)):
-        T_obj_cam = frame.T_cam_obj.inverse()
-        distance_m = np.linalg.norm(cloud.points, axis=1)
-        cosine = -(cloud.normals * cloud.points).sum(axis=1) / distance_m
-        others = [other for j, other in enumerate(frames) if j != k]
-        points_obj = T_obj_cam @ cloud.points
-        keep = confirmed(points_obj, others, DEPTH_SLACK * diameter_m)
-        kept.append(keep)
-        points.append(points_obj[keep])
-        normals.append(cloud.normals[keep] @ T_obj_cam.rotation.T)
-        weights.append((np.maximum(cosine, LEAST_COSINE) / distance_m**2)[keep])
-        views.append(np.full(int(keep.sum()), k))
-    colours = np.concatenate([cloud.colours[keep] for cloud, keep in zip(clouds, kept, strict=True)])
-    saliency = np.concatenate([cloud.saliency[keep] for cloud, keep in zip(clouds, kept, strict=True)])
-    return _voxel_means(
-        np.concatenate(points), np.concatenate(normals), colours, saliency,
-        np.concatenate(weights), np.concatenate(views), voxel_m,
-    )  # fmt: skip
-
-
-def _voxel_means(
-    points: Floats, normals: Floats, colours: Float32s, saliency: Float32s, weights: Floats,
-    views: npt.NDArray[np.intp], voxel_m: float,
-) -> FusedPoints:  # fmt: skip
-    cells = np.floor(points / voxel_m).astype(np.int64)
-    # Two sides of a thin wall can share a voxel; their normals must not cancel, so the side is part of the key.
-    side = (normals[:, [2]] > 0) * 4 + (normals[:, [1]] > 0) * 2 + (normals[:, [0]] > 0)
-    thin = np.concatenate((cells, side), axis=1)
-    _, voxel = np.unique(thin, axis=0, return_inverse=True)
-    voxel = voxel.reshape(-1)
-    count = int(voxel.max()) + 1
-    total = np.bincount(voxel, weights, count)
-
-    def mean(values: npt.NDArray) -> Floats:
-        sums = [np.bincount(voxel, weights * column, count) for column in values.T]
-        return np.stack(sums, axis=1) / total[:, None]
-
-    fused_saliency = mean(saliency)
-    unit = mean(normals)
-    pairs, pair = np.unique(np.stack((voxel, views), axis=1), axis=0, return_inverse=True)
-    pair_weight = np.bincount(pair.reshape(-1), weights)
-    of_view = np.stack([np.bincount(pair.reshape(-1), weights * column) for column in saliency.T], axis=1)
-    of_view /= pair_weight[:, None]
-    norms = np.linalg.norm(of_view, axis=1) * np.linalg.norm(fused_saliency[pairs[:, 0]], axis=1)
-    cosine = (of_view * fused_saliency[pairs[:, 0]]).sum(axis=1) / np.maximum(norms, 1e-12)
-    view_count = np.bincount(pairs[:, 0], minlength=count)
-    return FusedPoints(
-        points=mean(points),
-        normals=unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-12),
-        colours=mean(colours).astype(np.float32),
-        saliency=fused_saliency.astype(np.float32),
-        view_count=view_count.astype(np.int32),
-        agreement=(np.bincount(pairs[:, 0], cosine, count) / view_count).clip(0, 1).astype(np.float32),
+    slack_m = DEPTH_SLACK * diameter_m
+    parts = [_part(cloud, frames, k, slack_m) for k, cloud in enumerate(clouds)]
+    points, normals, colours, saliency, weights, views, confirmed = (
+        np.concatenate([part[field] for part in parts]) for field in range(7)
     )
+    voxel = _voxels(points, normals, voxel_m)
+    mean = _Mean(voxel, weights)
+    unit = mean(normals)
+    fused = mean(saliency)
+    T_obj_ref = frames[0].T_cam_obj.inverse()
+    return FusedPoints(
+        points=T_obj_ref @ mean(points),
+        normals=unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-12) @ T_obj_ref.rotation.T,
+        colours=mean(colours).astype(np.float32),
+        saliency=fused.astype(np.float32),
+        view_count=1 + np.rint(mean(confirmed[:, None])[:, 0]).astype(np.int32),
+        agreement=_agreement(voxel, views, weights, saliency, fused).astype(np.float32),
+    )
+
+
+def _part(cloud: PointCloud, frames: Sequence[PosedFrame], k: int, slack_m: float) -> tuple[npt.NDArray, ...]:
+    """What view k brings, in the camera coordinates of the first view: points, normals, colours, saliency, weights,
+    its number, and how many other views confirm each point."""
+    T_obj_cam = frames[k].T_cam_obj.inverse()
+    T_ref_cam = frames[0].T_cam_obj @ T_obj_cam
+    votes = cross_check(T_obj_cam @ cloud.points, others_than(frames, k), slack_m)
+    kept = votes.kept
+    points, normals = cloud.points[kept], cloud.normals[kept]
+    distance_m = np.linalg.norm(points, axis=1)
+    cosine = -(normals * points).sum(axis=1) / distance_m
+    return (
+        T_ref_cam @ points,
+        normals @ T_ref_cam.rotation.T,
+        cloud.colours[kept],
+        cloud.saliency[kept],
+        np.maximum(cosine, LEAST_COSINE) / distance_m**2,
+        np.full(len(points), k),
+        votes.confirmed[kept],
+    )
+
+
+def _voxels(points: Floats, normals: Floats, voxel_m: float) -> npt.NDArray[np.intp]:
+    """(N,) number of the voxel of every point. The two sides of a thin wall have voxels of their own: where they share
+    one, their normals would cancel."""
+    cells = np.floor(points / voxel_m).astype(np.int64)
+    sides = (normals > 0).astype(np.int64)
+    return np.unique(np.concatenate((cells, sides), axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+
+
+class _Mean:
+    """Weighted means over the points of every voxel: (N, C) -> (V, C)."""
+
+    def __init__(self, voxel: npt.NDArray[np.intp], weights: Floats) -> None:
+        self._voxel, self._weights, self._total = voxel, weights, np.bincount(voxel, weights)
+
+    def __call__(self, values: npt.NDArray) -> Floats:
+        sums = [np.bincount(self._voxel, self._weights * column) for column in values.T]
+        return np.stack(sums, axis=1) / self._total[:, None]
+
+
+def _agreement(
+    voxel: npt.NDArray[np.intp], views: npt.NDArray[np.intp], weights: Floats, saliency: Float32s, fused: Floats
+) -> Floats:
+    """(V,) mean over a voxel's views of the cosine between the view's saliency and the fused one."""
+    pairs, pair = np.unique(np.stack((voxel, views), axis=1), axis=0, return_inverse=True)
+    of_view, of_voxel = _Mean(pair.reshape(-1), weights)(saliency), fused[pairs[:, 0]]
+    norms = np.linalg.norm(of_view, axis=1) * np.linalg.norm(of_voxel, axis=1)
+    cosine = (of_view * of_voxel).sum(axis=1) / np.maximum(norms, 1e-12)
+    return (np.bincount(pairs[:, 0], cosine) / np.bincount(pairs[:, 0])).clip(0, 1)

@@ -8,7 +8,8 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from reference.fusion import confirmed, diameter_of, fuse
+from reference.cross_check import cross_check, others_than
+from reference.fusion import DEPTH_SLACK, diameter_of, fuse
 from reference.keyframes import choose_reference_frames
 from reference.quality import judge
 from tracker.cloud import LEAST_POINTS, CloudConfig, inliers, lift
@@ -99,11 +100,11 @@ def _surface(frame: PosedFrame, view_config: ViewConfig, cloud_config: CloudConf
 
 def _diameter(surfaces: Sequence[Floats], frames: Sequence[PosedFrame]) -> float:
     rough_m = diameter_of(np.concatenate(surfaces))
-    kept = []
-    for k, points in enumerate(surfaces):
-        others = [frame for j, frame in enumerate(frames) if j != k]
-        kept.append(points[confirmed(points, others, 0.05 * rough_m)])
-    return diameter_of(np.concatenate(kept))
+    checked = [
+        points[cross_check(points, others_than(frames, k), DEPTH_SLACK * rough_m).kept]
+        for k, points in enumerate(surfaces)
+    ]
+    return diameter_of(np.concatenate(checked))
 
 
 def _direction(frame: PosedFrame) -> Floats:

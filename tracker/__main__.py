@@ -43,7 +43,7 @@ class Track:
     def __call__(self) -> None:
         from tracker.concept import ConceptModel
         from tracker.config import dump_config, read_config
-        from tracker.errors import ConfigError
+        from tracker.errors import ConfigError, TrackerError
         from tracker.output import as_json_line, result_folder
         from tracker.pipeline import ObjectTracker
         from tracker.sources import open_source
@@ -58,6 +58,7 @@ class Track:
         tracker = ObjectTracker(models, config)
         source = open_source(self.source)
         summary = _Summary()
+        failure: TrackerError | None = None
         with ExitStack() as stack:
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
             lines = stack.enter_context((folder / "poses.jsonl").open("w")) if folder else None
@@ -79,6 +80,10 @@ class Track:
                             print(line, flush=True)
             except KeyboardInterrupt:
                 STDERR.print("stopped; what was tracked is kept")
+            except TrackerError as error:  # a frame that cannot be read does not cost those before it
+                failure = error
+        if failure:
+            raise failure
         if not self.quiet and not self.json:
             STDERR.print(summary.table())
 

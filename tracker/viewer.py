@@ -19,7 +19,7 @@ from tracker.result import TrackResult, TrackState
 Picture = npt.NDArray[np.uint8]
 
 # RGB, told apart by colour-blind readers too (Okabe and Ito, Color Universal Design, 2008)
-ESTIMATE, TRUTH, LOST, TEXT = (213, 94, 0), (0, 158, 115), (130, 130, 130), (255, 255, 255)
+ESTIMATE, TRUTH, TEXT, WARNING = (213, 94, 0), (0, 158, 115), (255, 255, 255), (255, 190, 80)
 AXES = ((230, 60, 60), (60, 200, 60), (80, 120, 255))
 EDGES = [(i, j) for i in range(8) for j in range(i + 1, 8) if (i ^ j).bit_count() == 1]
 FALLBACK_RATE_HZ = 30.0
@@ -44,7 +44,7 @@ class NullViewer:
 
 
 class OverlayVideo:
-    """Writes an mp4 of the frames with the poses drawn in: estimates orange, truth green, a lost object gray.
+    """Writes an mp4 of the frames with the poses drawn in: estimates orange, truth green; a line an object.
 
     Raises OutputError where no video can be written.
     """
@@ -83,6 +83,8 @@ def draw_overlay(
     picture = np.ascontiguousarray(frame.rgb.copy())
     for object_id, T_cam_obj in truth.items():
         _draw_box(picture, frame, T_cam_obj, boxes[object_id], TRUTH, 1)
+    strip = picture[: _line_height(picture) * len(results) + 8]
+    strip[:] = strip // 2  # text needs a ground
     for row, result in enumerate(results):
         corners = boxes[result.object_id]
         if result.pose is not None:
@@ -117,10 +119,12 @@ def _draw_line(picture: Picture, frame: Frame, ends_cam: Floats, colour: tuple[i
 def _write_line(picture: Picture, row: int, result: TrackResult) -> None:
     tracking = result.state is TrackState.TRACKING
     detail = f"{result.confidence:.2f}" if tracking else result.reason
-    text = f"{result.object_id}  {result.state.value}  {detail}"
-    scale = max(picture.shape[1] / 640, 0.6) * 0.45
-    height = int(40 * scale)
-    place = (int(8 * scale) + 6, height * (row + 1))
-    colour = TEXT if tracking else (255, 190, 80)
-    cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, scale, (0, 0, 0), 3, cv2.LINE_AA)
-    cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, scale, colour, 1, cv2.LINE_AA)
+    text = f"{result.object_id}: {result.state.value} {detail}"
+    height = _line_height(picture)
+    place = (8, height * (row + 1))
+    colour = TEXT if tracking else WARNING
+    cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, height / 40, colour, 1, cv2.LINE_AA)
+
+
+def _line_height(picture: Picture) -> int:
+    return max(12, picture.shape[1] // 36)
