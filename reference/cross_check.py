@@ -45,10 +45,12 @@ def cross_check(points_obj: Floats, others: Sequence[PosedFrame], slack_m: float
         x, y = np.clip(pixels[:, 0], 0, camera.width - 1), np.clip(pixels[:, 1], 0, camera.height - 1)
         seen = in_front & (pixels[:, 0] == x) & (pixels[:, 1] == y) & (depth_m[y, x] > 0)
         behind_m = depth_m[y, x] - points_cam[:, 2]
+        # At an outline rounding may pick the background: only where all pixels around lie behind is it seen through.
+        all_behind_m = cv2.erode(depth_m, np.ones((3, 3), np.uint8))[y, x] - points_cam[:, 2]
         on_surface = seen & (np.abs(behind_m) <= slack_m)
         near_mask = cv2.dilate(other.mask.astype(np.uint8), np.ones((2 * MASK_SLACK_PX + 1,) * 2, np.uint8)) > 0
         confirmed += on_surface & other.mask[y, x]
-        denied += (seen & (behind_m > slack_m)) | (on_surface & ~near_mask[y, x])
+        denied += (seen & (all_behind_m > slack_m)) | (on_surface & ~near_mask[y, x])
     return Votes(confirmed, denied)
 
 

@@ -69,7 +69,8 @@ def onboard(
         raise OnboardingError(f"no usable model of object {model.object_id!r}: {'; '.join(quality.problems)}")
     for problem in quality.problems:
         logger.warning("model of object %r: %s", model.object_id, problem)
-    return replace(model, notes={**model.notes, "quality": asdict(quality)})
+    verdict = {**asdict(quality), "problems": list(quality.problems)}
+    return replace(model, notes={**model.notes, "quality": verdict})
 
 
 def _posed(source: PosedSource, object_id: str, sighting: Sighting) -> PosedFrame:

@@ -1,12 +1,34 @@
-"""What tests share."""
+"""What tests share: rendered scenes, the models made of them, and how hypothesis behaves."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
+import torch
+from hypothesis import settings
+
+from reference.onboard import onboard, read_reference_frames
+from tracker.cloud import CloudConfig, PointCloud, lift
+from tracker.concept import ConceptModel
+from tracker.frame import Frame, PosedFrame, Provenance
+from tracker.geometry import Floats, Intrinsics, Pose
+from tracker.saliency import SaliencyBackend, open_backend
+from tracker.sources.synthetic import SyntheticScene, open_scene
+from tracker.view import ObjectView, ViewConfig, view_object
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+# The same examples at every run, and no example fails because the machine was busy.
+settings.register_profile("conceptrack", deadline=None, derandomize=True)
+settings.load_profile("conceptrack")
+
+# Small tensors gain nothing from more threads, and on a busy machine threads wait for each other.
+torch.set_num_threads(1)
 
 
 @pytest.fixture(scope="session")
@@ -15,3 +37,144 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip(f"the shared recordings are not at {SHARED_DATA}")
     return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def attributes() -> SaliencyBackend:
+    """The backend that needs no weights."""
+    return open_backend("attributes")
+
+
+@pytest.fixture(scope="session")
+def can_scene() -> SyntheticScene:
+    """A soup can turns and travels before a camera that is still: 90 frames, rendered when they are asked for."""
+    return open_scene("turn?size=320x240&object=soup_can")
+
+
+@pytest.fixture(scope="session")
+def can_model(can_scene: SyntheticScene, attributes: SaliencyBackend) -> ConceptModel:
+    """Of three frames of `can_scene`, from its two ends and its middle."""
+    return onboard(read_reference_frames(can_scene, "soup_can", 3), attributes)
+
+
+@pytest.fixture(scope="session")
+def can_frames(can_scene: SyntheticScene) -> list[Frame]:
+    """Frames 20 to 31 of `can_scene`, none of which `can_model` was made of."""
+    return [can_scene[index] for index in range(20, 32)]
+
+
+@pytest.fixture(scope="session")
+def can_truth(can_scene: SyntheticScene) -> Pose:
+    """T_cam_obj in frame 20 of `can_scene`."""
+    return can_scene.sightings("soup_can")[20].T_cam_obj
+
+
+@pytest.fixture(scope="session")
+def can_view(can_frames: list[Frame], can_model: ConceptModel) -> ObjectView:
+    """What frame 20 of `can_scene` shows of the can."""
+    view = view_object(can_frames[0], can_frames[0].masks["soup_can"], can_model.diameter_m, ViewConfig())
+    assert view is not None
+    return view
+
+
+@pytest.fixture(scope="session")
+def can_cloud(can_view: ObjectView, attributes: SaliencyBackend) -> PointCloud:
+    return lift(can_view, attributes([can_view])[0], CloudConfig())
+
+
+@pytest.fixture(scope="session")
+def table_scene() -> SyntheticScene:
+    """Six objects and clutter on a table, the camera goes around: 90 frames."""
+    return open_scene("tabletop?size=320x240")
+
+
+@pytest.fixture(scope="session")
+def table_models(table_scene: SyntheticScene, attributes: SaliencyBackend) -> dict[str, ConceptModel]:
+    """Of the mug and the tea box of `table_scene`, two reference frames each."""
+    chosen = ("mug", "tea_box")
+    return {name: onboard(read_reference_frames(table_scene, name, 2), attributes) for name in chosen}
+
+
+@pytest.fixture(scope="session")
+def globe() -> Callable[..., PosedFrame]:
+    """Draws a ball of ten centimetres before a gray wall, in colours that are a function of the place on it."""
+    return draw_globe
+
+
+GLOBE_RADIUS_M = 0.05
+GLOBE_CAMERA = Intrinsics(300.0, 300.0, 159.5, 119.5, 320, 240)
+
+
+def draw_globe(
+    T_cam_obj: Pose,
+    camera: Intrinsics = GLOBE_CAMERA,
+    wall_m: float = 0.8,
+    index: int = 0,
+    paint: Callable[[Floats], Floats] | None = None,
+) -> PosedFrame:
+    """paint: unit vectors (N, 3) of the object frame -> colours (N, 3) in [0, 255]; if None smooth, nowhere alike."""
+    rows, columns = np.indices((camera.height, camera.width)).reshape(2, -1)
+    rays = camera.unproject(columns, rows, np.ones(len(rows)))
+    centre, squared = T_cam_obj.translation_m, (rays**2).sum(axis=1)
+    along = rays @ centre
+    under_root = along**2 - squared * (centre @ centre - GLOBE_RADIUS_M**2)
+    mask = under_root > 0
+    depth_m = np.where(mask, (along - np.sqrt(np.maximum(under_root, 0))) / squared, wall_m)
+    rgb = np.full((len(rows), 3), 128.0)
+    outwards = T_cam_obj.inverse() @ (rays[mask] * depth_m[mask, None]) / GLOBE_RADIUS_M
+    rgb[mask] = (paint or _wavy)(outwards)
+    size = (camera.height, camera.width)
+    frame = Frame(
+        rgb=rgb.reshape(*size, 3).round().astype(np.uint8),
+        depth_m=depth_m.reshape(size).astype(np.float32),
+        intrinsics=camera,
+        stamp_ns=index * 33_333_333,
+        masks={"globe": mask.reshape(size)},
+        index=index,
+        provenance=Provenance(f"globe {index}", "drawn"),
+    )
+    return PosedFrame(frame, "globe", T_cam_obj, frame.masks["globe"])
+
+
+def _wavy(outwards: Floats) -> Floats:
+    x, y, z = outwards.T
+    return 128 + 120 * np.sin(np.stack((4 * x + z, 3 * y + 2 * x, 5 * z + y), axis=1))
+
+
+@pytest.fixture
+def bop_dataset(tmp_path: Path) -> Path:
+    """A dataset in BOP's layout with scene 3 of the split `test`: images 2, 5 and 10 of 48 x 36 pixels.
+
+    Object 4 is in all images, object 7 in the first two, and twice in image 5. Pixel (row, column) of image I has the
+    colour (I, row, column) and a depth of 500 + I millimetres, in units of a millimetre, in image 10 of a tenth of one.
+    Object 4 is the columns 10 to 19 (15 to 19 can be seen), object 7 the columns 20 to 29, its copy the last ones.
+    """
+    folder = tmp_path / "bop" / "test" / "000003"
+    for name in ("rgb", "depth", "mask", "mask_visib"):
+        (folder / name).mkdir(parents=True)
+    present = {2: (4, 7), 5: (7, 4, 7), 10: (4,)}
+    cameras, truth, info = {}, {}, {}
+    for image_id, object_ids in present.items():
+        rows, columns = np.indices((36, 48)).astype(np.uint8)
+        bgr = np.dstack((columns, rows, np.full_like(rows, image_id)))
+        cv2.imwrite(str(folder / "rgb" / f"{image_id:06d}.png"), bgr)
+        unit_mm = 0.1 if image_id == 10 else 1.0
+        depth = np.full((36, 48), round((500 + image_id) / unit_mm), np.uint16)
+        depth[:, :5] = 0
+        cv2.imwrite(str(folder / "depth" / f"{image_id:06d}.png"), depth)
+        cameras[image_id] = {"cam_K": [60.0, 0, 23 + image_id / 10, 0, 61.0, 17, 0, 0, 1], "depth_scale": unit_mm}
+        truth[image_id], info[image_id] = [], []
+        for place, object_id in enumerate(object_ids):
+            first = 40 if (image_id, place) == (5, 2) else {4: 10, 7: 20}[object_id]
+            whole = (columns >= first) & (columns < first + 10)
+            seen = whole & (columns >= 15)
+            name = f"{image_id:06d}_{place:06d}.png"
+            cv2.imwrite(str(folder / "mask" / name), whole.astype(np.uint8) * 255)
+            cv2.imwrite(str(folder / "mask_visib" / name), seen.astype(np.uint8) * 255)
+            turn = [0, -1, 0, 1, 0, 0, 0, 0, 1]
+            truth[image_id].append({"obj_id": object_id, "cam_R_m2c": turn, "cam_t_m2c": [first, image_id, 500]})
+            fraction = float(seen.sum() / whole.sum())
+            info[image_id].append({"px_count_visib": int(seen.sum()), "visib_fract": fraction})
+    for name, content in (("scene_camera", cameras), ("scene_gt", truth), ("scene_gt_info", info)):
+        (folder / f"{name}.json").write_text(json.dumps(content))
+    return tmp_path / "bop"

@@ -13,7 +13,7 @@ from tracker.saliency.attributes import lab_of, smooth_inside
 from tracker.view import Float32s, ObjectView
 
 SMOOTHING_PX = (0.8, 2.5)  # of a view; the model is smoothed alike over its surface
-SMOOTHING_NEIGHBOURS = 24
+SMOOTHING_NEIGHBOURS = 96  # at a point or two a pixel, all within two standard deviations of the coarse smoothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -60,7 +60,8 @@ def inliers(points: Floats, config: CloudConfig) -> npt.NDArray[np.bool_]:
     """(N,) bool, the points that survive both stages. None do where there are too few to judge."""
     if len(points) < LEAST_POINTS:
         return np.zeros(len(points), bool)
-    _, squared = small_gicp.KdTree(points).batch_knn_search(points, config.outlier_neighbours + 1)
+    neighbours = min(config.outlier_neighbours, len(points) - 1)
+    _, squared = small_gicp.KdTree(points).batch_knn_search(points, neighbours + 1)
     spacing = np.sqrt(np.asarray(squared)[:, 1:]).mean(axis=1)
     kept = spacing <= spacing.mean() + config.outlier_sigmas * spacing.std()
     radius = np.linalg.norm(points - np.median(points[kept], axis=0), axis=1)

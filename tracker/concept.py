@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import numpy as np
 import safetensors
 import safetensors.numpy
 
-from tracker.errors import ModelError
+from tracker.errors import ModelError, OutputError
 from tracker.geometry import Floats
 from tracker.saliency import SaliencyBackend
 from tracker.view import Float32s
@@ -65,7 +66,7 @@ class ConceptModel:
             )
 
     def save(self, path: str | Path) -> None:
-        """Write the file whole or not at all."""
+        """Write the file whole or not at all. Raises OutputError where it cannot be written."""
         path = Path(path)
         header = {
             "format": FORMAT,
@@ -78,10 +79,16 @@ class ConceptModel:
             "notes": self.notes,
         }
         arrays = {name: np.ascontiguousarray(getattr(self, name)) for name in ARRAYS}
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(path.name + ".partial")
-        safetensors.numpy.save_file(arrays, partial, metadata={"concept_model": json.dumps(header)})
-        os.replace(partial, path)
+        content = safetensors.numpy.save(arrays, metadata={"concept_model": json.dumps(header)})
+        partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            partial.write_bytes(content)
+            os.replace(partial, path)
+        except OSError as error:
+            with suppress(OSError):
+                partial.unlink()
+            raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
 
     @classmethod
     def load(cls, path: str | Path) -> ConceptModel:
@@ -94,7 +101,7 @@ class ConceptModel:
                 header = json.loads((file.metadata() or {}).get("concept_model", "{}"))
                 _check_header(path, header)
                 arrays = {name: file.get_tensor(name) for name in ARRAYS}
-        except safetensors.SafetensorError as error:
+        except (safetensors.SafetensorError, ValueError, OSError) as error:
             raise ModelError(f"{path}: not a whole concept model ({error})") from error
         _check_arrays(path, arrays, len(header["labels"]))
         return cls(
@@ -127,6 +134,8 @@ def _check_header(path: Path, header: dict[str, Any]) -> None:
     for key, kind in expected.items():
         if not isinstance(header.get(key), kind):
             raise ModelError(f"{path}: the header's {key} is {header.get(key)!r}, expected a {kind.__name__}")
+    if not 0 < header["diameter_m"] < np.inf:
+        raise ModelError(f"{path}: the header's diameter_m is {header['diameter_m']}, expected a length in metres")
 
 
 def _check_arrays(path: Path, arrays: dict[str, np.ndarray], concepts: int) -> None:

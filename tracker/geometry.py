@@ -36,6 +36,8 @@ class Pose:
         m = np.asarray(matrix, np.float64)
         if m.shape not in ((4, 4), (3, 4)) or not np.isfinite(m).all():
             raise FrameError(f"a pose is a finite 4x4 or 3x4 matrix, got shape {m.shape}: {m.tolist()}")
+        if np.abs(m[3:] - [0, 0, 0, 1]).max(initial=0) > ROTATION_TOLERANCE:
+            raise FrameError(f"the last row of a pose is 0 0 0 1, got {m[3].tolist()}: is the matrix transposed?")
         rotation = m[:3, :3]
         off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if off > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0:
@@ -47,12 +49,14 @@ class Pose:
 
     @classmethod
     def from_quaternion(cls, wxyz: npt.ArrayLike, translation_m: npt.ArrayLike) -> Pose:
-        """From a quaternion, scalar first, and a translation in metres. Raises FrameError on a zero quaternion."""
-        q = np.asarray(wxyz, np.float64)
-        if q.shape != (4,) or not np.linalg.norm(q) > 1e-9:
+        """From a quaternion, scalar first, and a translation in metres. Raises FrameError on a zero quaternion and on
+        numbers that are not finite."""
+        q, t_m = np.asarray(wxyz, np.float64), np.array(translation_m, np.float64)
+        if q.shape != (4,) or not np.isfinite(q).all() or np.linalg.norm(q) <= 1e-9:
             raise FrameError(f"a rotation quaternion has four numbers (w x y z), not all zero; got {q.tolist()}")
-        rotation = Rotation.from_quat(q, scalar_first=True).as_matrix()
-        return cls(rotation, np.array(translation_m, np.float64))
+        if t_m.shape != (3,) or not np.isfinite(t_m).all():
+            raise FrameError(f"a translation has three finite numbers, got {t_m.tolist()}")
+        return cls(Rotation.from_quat(q, scalar_first=True).as_matrix(), t_m)
 
     @classmethod
     def exp(cls, twist: npt.ArrayLike) -> Pose:

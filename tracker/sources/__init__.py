@@ -60,7 +60,7 @@ def _bop(argument: str) -> PosedSource:
     from tracker.sources.bop import BopScene
 
     path, separator, scene = argument.rpartition(":")
-    if not separator or not scene.isdigit():
+    if not separator or not scene.isdecimal():
         raise SourceError(f"bop:{argument}: expected bop:PATH:SCENE with the number of a scene")
     return BopScene(path, int(scene))
 

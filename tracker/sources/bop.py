@@ -23,6 +23,7 @@ from tracker.sources import Sighting, require_object
 from tracker.sources.image_files import read_depth_m, read_mask, read_rgb
 
 NOMINAL_RATE_HZ = 30.0  # the layout has no stamps
+DAMAGE = (KeyError, IndexError, TypeError, ValueError)  # what reading an entry of another layout comes to
 
 
 class BopScene:
@@ -39,9 +40,9 @@ class BopScene:
         self._mask_folder = {"visib": "mask_visib", "full": "mask", "none": None}[masks]
         self._cameras = _by_image(self._folder / "scene_camera.json")
         truth = self._folder / "scene_gt.json"
-        self._truth: dict[int, list[dict[str, Any]]] = _by_image(truth) if truth.exists() else {}
+        self._truth = _objects_by_image(truth) if truth.exists() else {}
         info = self._folder / "scene_gt_info.json"
-        self._info: dict[int, list[dict[str, Any]]] = _by_image(info) if info.exists() else {}
+        self._info = _by_image(info) if info.exists() else {}
         self.image_ids = sorted(self._cameras)
         if not self.image_ids:
             raise SourceError(f"{self._folder / 'scene_camera.json'} lists no image")
@@ -57,7 +58,7 @@ class BopScene:
         try:
             camera = self._cameras[image_id]
             matrix, unit_mm = np.reshape(camera["cam_K"], (3, 3)), float(camera["depth_scale"])
-        except (KeyError, TypeError, ValueError) as error:
+        except DAMAGE as error:
             raise SourceError(f"{self._folder}/scene_camera.json: image {image_id}: {error!r}") from error
         rgb = read_rgb(self._image_file("rgb", image_id))
         depth_m = read_depth_m(self._image_file("depth", image_id), unit_mm / 1000)
@@ -90,18 +91,23 @@ class BopScene:
         place = self._place(image_id, object_id)
         if place is None:
             return None
+        where = f"image {image_id}, object {object_id}"
         try:
             entry = self._truth[image_id][place]
-            T_cam_obj = np.eye(4)
-            T_cam_obj[:3, :3] = np.reshape(entry["cam_R_m2c"], (3, 3))
-            T_cam_obj[:3, 3] = np.asarray(entry["cam_t_m2c"], float) / 1000
-            info = self._info[image_id][place] if self._info else None
-            if info is None:
-                visible_px = int(self._read_mask("mask_visib", image_id, place).sum())
-                return Sighting(index, Pose.from_matrix(T_cam_obj), visible_px, 1.0 if visible_px else 0.0)
-            return Sighting(index, Pose.from_matrix(T_cam_obj), int(info["px_count_visib"]), float(info["visib_fract"]))
-        except (KeyError, IndexError, TypeError, ValueError, FrameError) as error:
-            raise SourceError(f"{self._folder}/scene_gt.json: image {image_id}, object {object_id}: {error}") from error
+            matrix = np.eye(4)
+            matrix[:3, :3] = np.reshape(entry["cam_R_m2c"], (3, 3))
+            matrix[:3, 3] = np.asarray(entry["cam_t_m2c"], float) / 1000
+            T_cam_obj = Pose.from_matrix(matrix)
+        except (*DAMAGE, FrameError) as error:
+            raise SourceError(f"{self._folder}/scene_gt.json: {where}: {error!r}") from error
+        if not self._info:
+            visible_px = int(self._read_mask("mask_visib", image_id, place).sum())
+            return Sighting(index, T_cam_obj, visible_px, 1.0 if visible_px else 0.0)
+        try:
+            info = self._info[image_id][place]
+            return Sighting(index, T_cam_obj, int(info["px_count_visib"]), float(info["visib_fract"]))
+        except DAMAGE as error:
+            raise SourceError(f"{self._folder}/scene_gt_info.json: {where}: {error!r}") from error
 
     def _place(self, image_id: int, object_id: str) -> int | None:
         """Position of the object in the image's list."""
@@ -153,3 +159,14 @@ def _by_image(path: Path) -> dict[int, Any]:
         raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
     except (ValueError, AttributeError) as error:
         raise SourceError(f"{path}: not the JSON that BOP's layout has there ({error})") from error
+
+
+def _objects_by_image(path: Path) -> dict[int, list[dict[str, Any]]]:
+    """The lists of scene_gt.json, every entry of which has the number of an object."""
+    content = _by_image(path)
+    for image_id, entries in content.items():
+        try:
+            [int(entry["obj_id"]) for entry in entries]
+        except DAMAGE as error:
+            raise SourceError(f"{path}: image {image_id} has no list of objects with an obj_id ({error!r})") from error
+    return content

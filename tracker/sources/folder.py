@@ -3,7 +3,8 @@
     PATH/rgb/NAME.{png,jpg}  depth/NAME.png (millimetres)  cam_K.txt
          masks/NAME.png  annotated_poses/NAME.txt (camera <- object, metres; both optional, for one object)
 
-Stamps are read from file names that are times (16 digits or more, nanoseconds); others are counted at a nominal rate.
+Stamps are read from file names that are Unix times (19 digits: nanoseconds, 16: microseconds); others are counted at a
+nominal rate.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from tracker.sources.image_files import read_depth_m, read_mask, read_rgb
 METRES_PER_UNIT = 0.001
 NOMINAL_RATE_HZ = 30.0
 OBJECT_ID = "object"
+CLOCK_UNITS_NS = {19: 1, 16: 1_000}  # digits of a Unix time -> its unit
 
 
 class Folder:
-    """Frames of the folder in the order of their names. Its one object is called "object".
+    """Frames of the folder in the order of their names, numbers by value. Its one object is called "object".
 
     Raises SourceError where a file that the layout needs is missing or damaged.
     """
@@ -35,7 +37,9 @@ class Folder:
     def __init__(self, path: str | Path) -> None:
         self._path = Path(path)
         self.name = f"folder:{path}"
-        self._files = sorted(p for p in (self._path / "rgb").glob("*") if p.suffix.lower() in (".png", ".jpg", ".jpeg"))
+        files = [p for p in (self._path / "rgb").glob("*") if p.suffix.lower() in (".png", ".jpg", ".jpeg")]
+        numbered = all(p.stem.isdecimal() for p in files)
+        self._files = sorted(files, key=lambda p: (int(p.stem) if numbered else 0, p.name))
         if not self._files:
             raise SourceError(f"{self._path}/rgb has no png or jpg pictures")
         self._K = _read_numbers(self._path / "cam_K.txt", 9).reshape(3, 3)
@@ -79,7 +83,7 @@ class Folder:
             mask_file = self._path / "masks" / f"{file.stem}.png"
             if pose_file.exists() and mask_file.exists():
                 visible_px = int(read_mask(mask_file).sum())
-                T_cam_obj = Pose.from_matrix(_read_numbers(pose_file, 16).reshape(4, 4))
+                T_cam_obj = _read_pose(pose_file)
                 found.append(Sighting(index, T_cam_obj, visible_px, 1.0 if visible_px else 0.0))
         return found
 
@@ -96,8 +100,16 @@ def _read_numbers(path: Path, count: int) -> np.ndarray:
     return numbers
 
 
+def _read_pose(path: Path) -> Pose:
+    try:
+        return Pose.from_matrix(_read_numbers(path, 16).reshape(4, 4))
+    except FrameError as error:
+        raise SourceError(f"{path}: {error}") from error
+
+
 def _stamps_ns(stems: list[str]) -> list[tuple[int, str]]:
-    """Stamp and its clock for every file: the names where all are nanosecond times, else the position."""
-    if all(stem.isdigit() and len(stem) >= 16 for stem in stems):
-        return [(int(stem), "recording") for stem in stems]
+    """Stamp and its clock for every file: the names where all are times of one unit, else the position."""
+    unit_ns = CLOCK_UNITS_NS.get(len(stems[0]))
+    if unit_ns and all(stem.isdecimal() and len(stem) == len(stems[0]) for stem in stems):
+        return [(int(stem) * unit_ns, "recording") for stem in stems]
     return [(round(i * 1e9 / NOMINAL_RATE_HZ), "nominal") for i in range(len(stems))]

@@ -16,7 +16,8 @@ JPEG_END = b"\xff\xd9"
 
 def read_rgb(path: Path) -> npt.NDArray[np.uint8]:
     """(H, W, 3) uint8, RGB."""
-    bgr = _decode(path, cv2.IMREAD_COLOR)
+    # As the sensor has it: a picture that its orientation tag turns would no longer fit its depth.
+    bgr = _decode(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     return np.ascontiguousarray(bgr[:, :, ::-1])
 
 
@@ -34,9 +35,9 @@ def read_depth_m(path: Path, metres_per_unit: float) -> npt.NDArray[np.float32]:
 
 
 def read_mask(path: Path) -> npt.NDArray[np.bool_]:
-    """(H, W) bool: any value but 0 is the object."""
+    """(H, W) bool: any value or colour but 0 is the object, whatever the transparency."""
     raw = _decode(path, cv2.IMREAD_UNCHANGED)
-    return np.asarray(raw if raw.ndim == 2 else raw.max(axis=2)) > 0
+    return np.asarray(raw if raw.ndim == 2 else raw[:, :, :3].max(axis=2)) > 0
 
 
 def _decode(path: Path, flag: int) -> npt.NDArray:
