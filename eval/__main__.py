@@ -136,7 +136,8 @@ class Score:
         from tracker.output import require_free
 
         if self.out:
-            require_free(self.out, self.overwrite)
+            for path in (self.out, self.out.with_suffix(".html")):
+                require_free(path, self.overwrite)
         dataset = open_dataset(self.dataset)
         scores = score_results_file(dataset, self.results, scene_ids=self.scenes, object_ids=self.objects)
         if self.out:

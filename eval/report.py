@@ -52,7 +52,7 @@ def write_scores(path: Path, scores: Scores, extra: Mapping[str, object]) -> Non
 
 def table(scores: Scores, title: str) -> Table:
     """One row an object, the mean of objects, and all instances pooled."""
-    out = Table(title=title, caption=LEGEND, caption_justify="left", box=SIMPLE_HEAD, padding=(0, 1))
+    out = Table(title=title, caption=LEGEND, caption_justify="left", box=SIMPLE_HEAD, padding=(0, 0), pad_edge=False)
     for heading in ("object", *(heading for heading, _ in COLUMNS.values())):
         out.add_column(heading, justify="left" if heading == "object" else "right", no_wrap=True)
     for name, metrics in scores.per_object.items():
@@ -89,7 +89,8 @@ def write_html(path: Path, scores: Scores, extra: Mapping[str, object], title: s
 
 
 def _cells(metrics: Metrics) -> list[str]:
-    return [f"{metrics[name]:.{digits}f}" if name in metrics else "-" for name, (_, digits) in COLUMNS.items()]
+    values = {name: metrics.get(name, np.nan) for name in COLUMNS}
+    return ["-" if np.isnan(values[name]) else f"{values[name]:.{digits}f}" for name, (_, digits) in COLUMNS.items()]
 
 
 def _row(name: str, metrics: Metrics) -> str:

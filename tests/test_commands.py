@@ -1,0 +1,455 @@
+"""The three programs as they are called: what they write, what they refuse, and in which words."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import pytest
+
+import eval.__main__
+import reference.__main__
+import tracker.__main__
+import tracker.sources
+from eval.bop_results import read_results
+from tracker.concept import ConceptModel
+from tracker.config import TrackerConfig, read_config
+from tracker.errors import SourceError
+from tracker.frame import Frame
+from tracker.sources.synthetic import open_scene
+
+BOX = "tea_box"
+SCENE = f"turn?size=160x120&frames=6&object={BOX}"
+SOURCE = f"synthetic:{SCENE}"
+PROGRAMS = {"reference": reference.__main__.main, "tracker": tracker.__main__.main, "eval": eval.__main__.main}
+
+
+@dataclass(frozen=True)
+class Said:
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Said]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """A program's own `main` with the arguments of a command line."""
+
+    def call(program: str, *arguments: object) -> Said:
+        capsys.readouterr()
+        monkeypatch.setattr(sys, "argv", [program, *map(str, arguments)])
+        try:
+            PROGRAMS[program]()
+            code = 0
+        except SystemExit as ending:
+            code = int(ending.code or 0)
+        told = capsys.readouterr()
+        return Said(code, str(told.out), str(told.err))
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Made by the command line itself, in a process of its own."""
+    path = tmp_path_factory.mktemp("models") / "box.concept"
+    told = process("reference", SOURCE, "--object", BOX, "--views", 2, "--out", path)
+    assert (told.code, told.out) == (0, ""), told.err
+    return path
+
+
+def process(program: str, *arguments: object) -> Said:
+    """`python -m PROGRAM ...`, as a user calls it."""
+    line = [sys.executable, "-m", program, *map(str, arguments)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)  # noqa: S603
+    return Said(done.returncode, done.stdout, done.stderr)
+
+
+def assert_refused(said: Said, *words: str) -> None:
+    """One sentence on the standard error, exit code 1, and nothing that looks like a crash."""
+    assert said.code == 1, said
+    assert said.out == ""
+    assert "Traceback" not in said.err
+    assert said.err.startswith("error: ")
+    assert len(said.err.strip().splitlines()) == 1
+    for word in words:
+        assert word in said.err
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture
+def filled(tmp_path: Path) -> Path:
+    """A folder with somebody's results."""
+    folder = tmp_path / "filled"
+    folder.mkdir()
+    (folder / "precious.txt").write_text("of last week")
+    return folder
+
+
+# The command lines themselves
+
+
+@pytest.mark.parametrize(
+    ("program", "expected"),
+    [
+        ("reference", ("--object", "--views", "--backend", "--out", "--overwrite")),
+        ("tracker", ("--model", "--out", "--view", "--json", "--prior", "--masks")),
+        ("eval", ("track", "score")),
+    ],
+)
+def test_help_lists_the_options_and_ends_well(program: str, expected: tuple[str, ...]) -> None:
+    told = process(program, "--help")
+    assert told.code == 0
+    assert f"python -m {program}" in told.out
+    assert all(word in told.out for word in expected)
+    assert told.err == ""
+
+
+def test_an_error_is_a_sentence_and_not_a_traceback(tmp_path: Path) -> None:
+    told = process("tracker", SOURCE, "--model", tmp_path / "absent.concept")
+    assert_refused(told, "absent.concept", "no such model file")
+
+
+def test_the_whole_way_from_a_source_to_json_lines(model: Path, tmp_path: Path) -> None:
+    told = process("tracker", SOURCE, "--model", model, "--json", "--out", tmp_path / "out")
+    assert told.code == 0, told.err
+    assert told.err == ""
+    assert told.out == (tmp_path / "out" / "poses.jsonl").read_text()
+    truth = open_scene(SCENE).sightings(BOX)
+    lines = [json.loads(line) for line in told.out.splitlines()]
+    assert [line["frame"] for line in lines] == list(range(6))
+    for line, sighting in zip(lines, truth, strict=True):
+        assert (line["object"], line["state"]) == (BOX, "tracking")
+        assert line["T_cam_obj"]["translation_m"] == pytest.approx(sighting.T_cam_obj.translation_m, abs=0.003)
+        sign = 1 if sighting.T_cam_obj.quaternion_wxyz @ line["T_cam_obj"]["quaternion_wxyz"] > 0 else -1
+        wxyz = [sign * q for q in line["T_cam_obj"]["quaternion_wxyz"]]
+        assert wxyz == pytest.approx(sighting.T_cam_obj.quaternion_wxyz, abs=0.03)
+        assert len(line["covariance"]) == 6
+        assert line["timings_ms"]["total"] > 0
+        assert 0.25 < line["confidence"] <= 1
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_an_option_that_does_not_exist_is_a_mistake_of_the_command_line(program: str, run: Run) -> None:
+    said = run(program, "--colour", "red")
+    assert said.code == 2
+    assert "Traceback" not in said.err
+
+
+def test_eval_wants_to_know_what_to_do(run: Run) -> None:
+    assert run("eval").code == 2
+
+
+# python -m reference
+
+
+def test_reference_writes_a_model_and_says_what_it_is_worth(model: Path, run: Run, tmp_path: Path) -> None:
+    made = ConceptModel.load(model)
+    assert (made.object_id, made.backend) == (BOX, "attributes")
+    again = run("reference", SOURCE, "--object", BOX, "--views", 2, "--out", tmp_path / "new" / "box.concept")
+    assert (again.code, again.out) == (0, "")
+    for word in (BOX, "attributes", f"{len(made)}", f"{made.diameter_m * 1000:.0f} mm"):
+        assert word in again.err
+    assert (tmp_path / "new" / "box.concept").read_bytes() == model.read_bytes()
+
+
+def test_reference_overwrites_only_when_it_is_told_to(model: Path, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "box.concept"
+    path.write_text("precious")
+    line = ("reference", SOURCE, "--object", BOX, "--views", 2, "--out", path)
+    assert_refused(run(*line), "box.concept exists already", "--overwrite")
+    assert path.read_text() == "precious"
+    assert run(*line, "--overwrite").code == 0
+    assert path.read_bytes() == model.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "words"),
+    [
+        (SOURCE, ("--object", "spoon"), ("'spoon'", BOX)),
+        (SOURCE, ("--object", BOX, "--backend", "tea"), ("'tea'", "attributes")),
+        (SOURCE, ("--object", BOX, "--views", "0"), ("--views", "0")),
+        ("synthetic:kitchen", ("--object", BOX), ("'kitchen'", "tabletop", "leave")),
+        ("webcam:0", ("--object", BOX), ("webcam:0", "bop", "folder", "synthetic")),
+        ("synthetic:turn?size=64x64&object=mug&frames=2", ("--object", "mug"), ("none of 2 frames", "pixels")),
+    ],
+)
+def test_reference_refuses_what_it_does_not_know_and_leaves_no_file(
+    source: str, options: tuple[str, ...], words: tuple[str, ...], run: Run, tmp_path: Path
+) -> None:
+    assert_refused(run("reference", source, *options, "--out", tmp_path / "a.concept"), *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+# python -m tracker
+
+
+def test_tracker_writes_lines_settings_and_a_video(model: Path, run: Run, tmp_path: Path) -> None:
+    said = run("tracker", SOURCE, "--model", model, "--out", tmp_path / "out", "--view", "overlay", "--prior", "off")
+    assert (said.code, said.out) == (0, ""), said.err
+    assert BOX in said.err
+    assert set(content(tmp_path / "out")) == {"poses.jsonl", "config.yaml", "overlay.mp4"}
+    assert len((tmp_path / "out" / "poses.jsonl").read_text().splitlines()) == 6
+    assert read_config(tmp_path / "out" / "config.yaml") == TrackerConfig(prior=False)
+    video = cv2.VideoCapture(str(tmp_path / "out" / "overlay.mp4"))
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 6
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_tracker_needs_no_folder_and_can_be_quiet(
+    model: Path, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("tracker", SOURCE, "--model", model, "--quiet") == Said(0, "", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_tracker_takes_settings_from_a_file_and_keeps_all_of_them(model: Path, run: Run, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("seed: 7\nmatching:\n  temperature: 0.5\n")
+    said = run("tracker", SOURCE, "--model", model, "--config", tmp_path / "mine.yaml", "--out", tmp_path / "out")
+    assert said.code == 0, said.err
+    kept = read_config(tmp_path / "out" / "config.yaml")
+    assert (kept.seed, kept.matching.temperature) == (7, 0.5)
+    assert kept.model_copy(update={"seed": 42, "matching": TrackerConfig().matching}) == TrackerConfig()
+
+
+def test_results_are_replaced_only_when_it_is_asked_for(model: Path, run: Run, filled: Path) -> None:
+    line = ("tracker", SOURCE, "--model", model, "--out", filled)
+    assert_refused(run(*line), "holds results already", "--overwrite")
+    assert content(filled) == {"precious.txt": b"of last week"}
+    assert run(*line, "--overwrite").code == 0
+    assert set(content(filled)) == {"poses.jsonl", "config.yaml"}
+    assert [path.name for path in filled.parent.iterdir()] == ["filled"]
+
+
+def test_an_empty_folder_holds_no_results(model: Path, run: Run, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert run("tracker", SOURCE, "--model", model, "--out", tmp_path / "empty").code == 0
+    assert set(content(tmp_path / "empty")) == {"poses.jsonl", "config.yaml"}
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "words"),
+    [
+        ("synthetic:kitchen", (), ("'kitchen'", "tabletop")),
+        ("webcam:0", (), ("webcam:0", "bop, folder, synthetic")),
+        ("bop:/nowhere:1", (), ("/nowhere",)),
+        (SOURCE, ("--config", "unknown.yaml"), ("'colour'", "prior", "verification", "filter")),
+        (SOURCE, ("--config", "deep.yaml"), ("'filter.speed'", "acceleration_mps2", "gate")),
+        (SOURCE, ("--config", "wrong.yaml"), ("accept", "less than or equal to 1")),
+        (SOURCE, ("--config", "absent.yaml"), ("absent.yaml",)),
+        (SOURCE, ("--model", "{model}"), ("two models", BOX)),
+        (SOURCE, ("--model", "unknown.yaml"), ("unknown.yaml", "concept model")),
+        (SOURCE, ("--model", "[bold]we[/]ird.concept"), ("[bold]we[/]ird.concept",)),
+    ],
+)
+def test_tracker_refuses_what_it_does_not_know_and_leaves_no_folder(
+    source: str,
+    options: tuple[str, ...],
+    words: tuple[str, ...],
+    model: Path,
+    run: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    files = {"unknown.yaml": "colour: red", "deep.yaml": "filter: {speed: 3}", "wrong.yaml": "accept: 2"}
+    for name, text in files.items():
+        Path(name).write_text(text)
+    given = [option.format(model=model) for option in options]
+    assert_refused(run("tracker", source, "--model", model, *given, "--out", "out"), *words)
+    assert set(content(tmp_path)) == set(files)
+
+
+@pytest.mark.parametrize("program", ["tracker", "eval"])
+def test_a_picture_without_a_folder_to_put_it_is_refused(program: str, model: Path, run: Run) -> None:
+    what = (SOURCE, "--model", model) if program == "tracker" else ("track", "--dataset", SOURCE)
+    assert_refused(run(program, *what, "--view", "overlay"), "--view overlay", "--out")
+
+
+def test_tracker_wants_a_model(run: Run) -> None:
+    said = run("tracker", SOURCE)
+    assert said.code in (1, 2)
+    assert "model" in said.err
+    assert "Traceback" not in said.err
+
+
+class Interrupted:
+    """The recording, in which reading the fourth frame ends badly."""
+
+    name = "interrupted"
+
+    def __init__(self, how: BaseException) -> None:
+        self._how, self._scene = how, open_scene(SCENE)
+
+    def __len__(self) -> int:
+        return len(self._scene)
+
+    def __iter__(self) -> Iterator[Frame]:
+        for index in range(3):
+            yield self._scene[index]
+        raise self._how
+
+
+@pytest.fixture
+def interrupted(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], None]:
+    """Makes every source end that way."""
+
+    def end(how: BaseException) -> None:
+        monkeypatch.setattr(tracker.sources, "open_source", lambda _: Interrupted(how))
+
+    return end
+
+
+def test_a_frame_that_cannot_be_read_does_not_cost_those_before_it(
+    model: Path, run: Run, tmp_path: Path, interrupted: Callable[[BaseException], None]
+) -> None:
+    interrupted(SourceError("rgb/000003.png: damaged"))
+    assert_refused(run("tracker", SOURCE, "--model", model, "--out", tmp_path / "out"), "rgb/000003.png: damaged")
+    assert len((tmp_path / "out" / "poses.jsonl").read_text().splitlines()) == 3
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_run_that_is_stopped_keeps_what_was_tracked(
+    model: Path, run: Run, tmp_path: Path, interrupted: Callable[[BaseException], None]
+) -> None:
+    interrupted(KeyboardInterrupt())
+    said = run("tracker", SOURCE, "--model", model, "--out", tmp_path / "out", "--view", "overlay")
+    assert "stopped" in said.err
+    assert len((tmp_path / "out" / "poses.jsonl").read_text().splitlines()) == 3
+    assert cv2.VideoCapture(str(tmp_path / "out" / "overlay.mp4")).get(cv2.CAP_PROP_FRAME_COUNT) == 3
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_crash_leaves_no_half_folder_and_costs_no_older_results(
+    overwrite: bool, model: Path, run: Run, filled: Path, interrupted: Callable[[BaseException], None]
+) -> None:
+    interrupted(RuntimeError("a bug"))
+    out, options = (filled, ("--overwrite",)) if overwrite else (filled.with_name("new"), ())
+    with pytest.raises(RuntimeError, match="a bug"):
+        run("tracker", SOURCE, "--model", model, "--out", out, *options)
+    assert [path.name for path in filled.parent.iterdir()] == ["filled"]
+    assert content(filled) == {"precious.txt": b"of last week"}
+
+
+# python -m eval
+
+
+@pytest.fixture(scope="module")
+def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that `eval track` writes, from a process of its own."""
+    folder = tmp_path_factory.mktemp("evaluated") / "out"
+    told = process("eval", "track", "--dataset", SOURCE, "--views", 2, "--out", folder, "--view", "overlay")
+    assert (told.code, told.out) == (0, ""), told.err
+    assert "pooled" in told.err
+    return folder
+
+
+def test_eval_track_writes_poses_scores_a_page_settings_and_a_video(evaluated: Path) -> None:
+    files = {"results.csv", "scores.json", "report.html", "config.yaml", "overlay.mp4"}
+    assert set(content(evaluated)) == files
+    assert [path.name for path in evaluated.parent.iterdir()] == ["out"]
+    assert read_config(evaluated / "config.yaml") == TrackerConfig()
+    assert [e.image_id for e in read_results(evaluated / "results.csv")] == list(range(6))
+
+
+def test_the_scores_of_eval_track_have_the_layout_that_others_rely_on(evaluated: Path) -> None:
+    scores = json.loads((evaluated / "scores.json").read_text())
+    assert set(scores) == {"protocol", "metrics", "latency_ms", "environment"}
+    assert set(scores["metrics"]) == {"pooled", "mean_of_objects", "per_object"}
+    assert set(scores["metrics"]["per_object"]) == {BOX}
+    assert {"median", "p95", "stages"} == set(scores["latency_ms"])
+    pooled, protocol = scores["metrics"]["pooled"], scores["protocol"]
+    assert pooled["adds_auc"] > 95
+    assert (pooled["missing"], pooled["lost_fraction"], pooled["false_tracks"]) == (0, 0, 0)
+    assert pooled["instances"] == 6 - int(protocol["reference_frames"].split("(")[1].split()[0])
+    assert 1 <= 6 - pooled["instances"] <= 2
+    assert "not stated" not in protocol.values()
+    assert (protocol["dataset"], protocol["views"], protocol["prior"]) == (SOURCE, 2, "on")
+
+
+def test_eval_score_scores_what_eval_track_wrote(evaluated: Path, run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "mine.json"
+    said = run("eval", "score", "--dataset", SOURCE, "--results", evaluated / "results.csv", "--out", out)
+    assert (said.code, said.out) == (0, ""), said.err
+    assert set(content(out.parent)) == {"mine.json", "mine.html"}
+    scores = json.loads(out.read_text())
+    assert scores["metrics"]["pooled"]["instances"] == 6  # no reference frame is told to it
+    assert scores["metrics"]["pooled"]["adds_auc"] > 95
+    assert scores["protocol"]["masks"] == "not stated"
+    assert f"{scores['metrics']['pooled']['adds_auc']:.1f}" in said.err
+
+
+@pytest.mark.parametrize("name", ["mine.json", "mine.html"])
+def test_eval_score_replaces_scores_and_page_only_when_it_is_asked_to(
+    name: str, evaluated: Path, run: Run, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text("precious")
+    results = evaluated / "results.csv"
+    line = ("eval", "score", "--dataset", SOURCE, "--results", results, "--out", tmp_path / "mine.json")
+    assert_refused(run(*line), name, "--overwrite")
+    assert content(tmp_path) == {name: b"precious"}
+    assert run(*line, "--overwrite").code == 0
+    assert json.loads((tmp_path / "mine.json").read_text())["metrics"]["pooled"]["instances"] == 6
+
+
+def test_eval_track_can_score_raw_poses_without_a_prior(run: Run, tmp_path: Path) -> None:
+    options = ("--prior", "off", "--poses", "raw", "--views", 1, "--objects", BOX, "--scenes", 1)
+    said = run("eval", "track", "--dataset", SOURCE, *options, "--out", tmp_path / "out")
+    assert said.code == 0, said.err
+    protocol = json.loads((tmp_path / "out" / "scores.json").read_text())["protocol"]
+    assert (protocol["prior"], protocol["poses"], protocol["views"]) == ("off", "raw", 1)
+    assert not read_config(tmp_path / "out" / "config.yaml").prior
+
+
+def test_eval_track_refuses_a_folder_with_results(run: Run, filled: Path) -> None:
+    assert_refused(run("eval", "track", "--dataset", SOURCE, "--out", filled), "holds results already")
+    assert content(filled) == {"precious.txt": b"of last week"}
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--dataset", "synthetic:kitchen"), ("'kitchen'", "tabletop")),
+        (("--dataset", "ycbv:/data"), ("ycbv:/data", "bop, synthetic")),
+        (("--dataset", SOURCE, "--scenes", "4"), ("no scene 4", "1")),
+        (("--dataset", SOURCE, "--objects", "spoon"), ("no object 'spoon'", BOX)),
+        (("--dataset", SOURCE, "--backend", "tea"), ("'tea'", "attributes")),
+        (("--dataset", SOURCE, "--views", "0"), ("--views", "0")),
+        (("--dataset", SOURCE, "--config", "absent.yaml"), ("absent.yaml",)),
+    ],
+)
+def test_eval_track_refuses_what_it_does_not_know_and_leaves_no_folder(
+    options: tuple[str, ...], words: tuple[str, ...], run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert_refused(run("eval", "track", *options, "--out", "out"), *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--dataset", SOURCE, "--results", "absent.csv"), ("absent.csv", "cannot be read")),
+        (("--dataset", SOURCE, "--results", "broken.csv"), ("broken.csv, line 1",)),
+        (("--dataset", "synthetic:kitchen", "--results", "broken.csv"), ("'kitchen'",)),
+    ],
+)
+def test_eval_score_refuses_what_it_cannot_read_and_leaves_no_file(
+    options: tuple[str, ...], words: tuple[str, ...], run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("broken.csv").write_text("scene,image,pose\n")
+    assert_refused(run("eval", "score", *options, "--out", "out.json"), *words)
+    assert set(content(tmp_path)) == {"broken.csv"}
