@@ -17,7 +17,7 @@ from tracker.concept import ConceptModel
 from tracker.errors import OnboardingError
 from tracker.frame import PosedFrame
 from tracker.geometry import Floats
-from tracker.saliency import SaliencyBackend
+from tracker.saliency import Query, SaliencyBackend
 from tracker.sources import PosedSource, Sighting
 from tracker.view import ViewConfig, bounding_box, view_object
 
@@ -34,8 +34,11 @@ def onboard(
     backend: SaliencyBackend,
     view_config: ViewConfig | None = None,
     cloud_config: CloudConfig | None = None,
+    vocabulary: Sequence[str] | None = None,
 ) -> ConceptModel:
     """One concept model from frames with known poses and masks of one object. Its frame is that of the poses.
+
+    vocabulary: the concepts that it is to hold, None for the backend's own choice.
 
     Raises OnboardingError where a frame has no usable points or the frames together do not make a model.
     """
@@ -50,7 +53,9 @@ def onboard(
     # What is where? The concepts, at scales relative to that size.
     views = [view_object(f.frame, f.mask, diameter_m, view_config) for f in frames]
     seen = [view for view in views if view is not None]
-    clouds = [lift(view, maps, cloud_config) for view, maps in zip(seen, backend(seen), strict=True)]
+    labels = backend.labels_for(vocabulary)
+    saliency = backend([Query(view, labels) for view in seen])
+    clouds = [lift(view, maps, cloud_config) for view, maps in zip(seen, saliency, strict=True)]
 
     # One model of all views.
     fused = fuse(clouds, frames, diameter_m, voxel_m=diameter_m / view_config.pixels_across)
@@ -58,7 +63,7 @@ def onboard(
         object_id=frames[0].object_id,
         diameter_m=diameter_m,
         view_directions=np.stack([_direction(frame) for frame in frames]),
-        labels=backend.labels,
+        labels=labels,
         backend=backend.name,
         fingerprint=backend.fingerprint,
         notes={"reference_frames": [frame.frame.provenance.source for frame in frames]},

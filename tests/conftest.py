@@ -17,7 +17,7 @@ from tracker.cloud import CloudConfig, PointCloud, lift
 from tracker.concept import ConceptModel
 from tracker.frame import Frame, PosedFrame, Provenance
 from tracker.geometry import Floats, Intrinsics, Pose
-from tracker.saliency import SaliencyBackend, open_backend
+from tracker.saliency import Query, SaliencyBackend, open_backend
 from tracker.sources.synthetic import SyntheticScene, open_scene
 from tracker.view import ObjectView, ViewConfig, view_object
 
@@ -79,7 +79,7 @@ def can_view(can_frames: list[Frame], can_model: ConceptModel) -> ObjectView:
 
 @pytest.fixture(scope="session")
 def can_cloud(can_view: ObjectView, attributes: SaliencyBackend) -> PointCloud:
-    return lift(can_view, attributes([can_view])[0], CloudConfig())
+    return lift(can_view, attributes([Query(can_view, attributes.labels_for(None))])[0], CloudConfig())
 
 
 @pytest.fixture(scope="session")

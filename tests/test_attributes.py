@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from tracker.errors import ConfigError
 from tracker.frame import Frame, PosedFrame
 from tracker.geometry import Intrinsics, Pose
-from tracker.saliency import BACKENDS, Saliency, SaliencyBackend, fingerprint_of, open_backend
-from tracker.saliency.attributes import COLOUR_TERMS, RELATIVE_TERMS, Attributes
+from tracker.saliency import BACKENDS, BackendOptions, Query, Saliency, SaliencyBackend, fingerprint_of, open_backend
+from tracker.saliency.attributes import COLOUR_TERMS, RELATIVE_TERMS, Attributes, terms_in
 from tracker.sources.synthetic import open_scene
 from tracker.view import Box, Float32s, ObjectView, ViewConfig, view_object
 
@@ -63,9 +63,14 @@ def seen(frame: Frame, mask: npt.NDArray[np.bool_], extent_m: float, pixels_acro
     return view
 
 
+def asked(backend: SaliencyBackend, views: Sequence[ObjectView], *labels: str) -> list[Saliency]:
+    """The maps of these labels, of the backend's own when there are none."""
+    return backend([Query(view, backend.labels_for(labels or None)) for view in views])
+
+
 def maps_of(view: ObjectView, backend: SaliencyBackend) -> dict[str, Float32s]:
     """Label -> (64, 64) map of a photograph (as many as it has pixels across), without the margin."""
-    (saliency,) = backend([view])
+    (saliency,) = asked(backend, [view])
     return {label: whole[4:-4, 4:-4] for label, whole in zip(saliency.labels, saliency.maps, strict=True)}
 
 
@@ -79,21 +84,21 @@ def test_maps_have_a_layer_a_label_and_values_from_nothing_to_one(
 ) -> None:
     balls = [globe(AHEAD), globe(Pose(np.eye(3), np.array([0, 0, 0.25])))]
     views = [seen(ball.frame, ball.mask, 0.1) for ball in balls]
-    several = attributes(views)
+    several = asked(attributes, views)
     for view, saliency in zip(views, several, strict=True):
-        assert saliency.labels == attributes.labels
-        assert saliency.maps.shape == (len(attributes.labels), *view.inside.shape)
+        assert saliency.labels == attributes.labels_for(None)
+        assert saliency.maps.shape == (len(attributes.labels_for(None)), *view.inside.shape)
         assert saliency.maps.dtype == np.float32
         assert saliency.box == view.box
         assert np.isfinite(saliency.maps).all()
         assert saliency.maps.min() >= 0
         assert saliency.maps.max() <= 1
         assert not saliency.maps[:, ~view.inside].any()
-        assert np.array_equal(attributes([view])[0].maps, saliency.maps)
+        assert np.array_equal(asked(attributes, [view])[0].maps, saliency.maps)
 
 
 def test_labels_are_distinct_and_the_fingerprint_tells_settings_apart(attributes: SaliencyBackend) -> None:
-    assert len(set(attributes.labels)) == len(attributes.labels) == 49
+    assert len(set(attributes.labels_for(None))) == len(attributes.labels_for(None)) == 49
     assert attributes.fingerprint.startswith("attributes-")
     assert fingerprint_of("attributes", "a") == fingerprint_of("attributes", "a")
     assert len({fingerprint_of(*settings) for settings in (("x", "a"), ("x", "b"), ("y", "a"))}) == 3
@@ -187,7 +192,7 @@ def test_flat_is_flat_and_a_ball_is_curved_and_a_box_has_an_edge(
     assert max(flat[term][10:-10, 10:-10].max() for term in ("curved", "convex edge", "rim")) < 0.05
     ball = globe(AHEAD)
     view = seen(ball.frame, ball.mask, 0.1)
-    (saliency,) = attributes([view])
+    (saliency,) = asked(attributes, [view])
     round_off = dict(zip(saliency.labels, saliency.maps, strict=True))
     centre = (slice(20, 32), slice(20, 32))
     assert round_off["curved"][centre].mean() > 2 * flat["curved"][20:32, 20:32].mean() + 0.02
@@ -254,7 +259,7 @@ def test_a_rendered_object_has_the_same_concepts_at_twice_the_resolution(attribu
         nearest = np.rint(np.stack((rows, columns))).astype(int)
         depth_m = scene[8].depth_m[tuple(nearest)]
         visible = scene[8].masks["cereal_box"][tuple(nearest)] & (np.abs(depth_m - points_cam[:, 2]) < 0.003)
-        values.append(np.where(visible[:, None], attributes([view])[0].sample(columns, rows), np.nan))
+        values.append(np.where(visible[:, None], asked(attributes, [view])[0].sample(columns, rows), np.nan))
     both = np.isfinite(values[0] + values[1]).all(axis=1)
     assert both.sum() > 500
     coarse, fine = values[0][both], values[1][both]
@@ -282,4 +287,49 @@ def test_what_is_beside_the_object_does_not_show_in_its_maps(attributes: Salienc
     rgb = np.where(view.mask[:, :, None], view.frame.rgb, np.uint8(200))
     depth_m = np.where(view.mask, view.frame.depth_m, np.float32(0.55))
     among = seen(replace(view.frame, rgb=rgb, depth_m=depth_m), view.mask, view.extent_m)
-    assert np.array_equal(attributes([among])[0].maps, attributes([view])[0].maps)
+    assert np.array_equal(asked(attributes, [among])[0].maps, asked(attributes, [view])[0].maps)
+
+
+def test_a_phrase_is_where_all_its_measurable_terms_are(attributes: SaliencyBackend) -> None:
+    """Left half red, right half blue; the red handle is red, the handle alone means nothing to a colorimeter."""
+    view = photograph(panel(blue=ALL, red=LEFT))
+    phrase, red, blue = asked(attributes, [view], "red handle", "red", "dark BLUE  flat spout")[0].maps
+    assert np.array_equal(phrase, red)
+    assert red[4:-4, 8:32].mean() > 0.5 > 0.1 > red[4:-4, 40:64].mean()
+    assert blue[4:-4, 40:64].mean() > 4 * blue[4:-4, 8:32].mean()
+
+
+@pytest.mark.parametrize(
+    ("label", "terms"),
+    [
+        ("red nearby", ("red nearby",)),
+        ("red or nearby", ("red",)),
+        ("the convex edge of a grey lid", ("convex edge", "grey")),
+        ("reddish", ()),
+        ("blue and blue", ("blue",)),
+    ],
+)
+def test_the_longest_terms_of_a_phrase_count(label: str, terms: tuple[str, ...]) -> None:
+    assert terms_in(label) == terms
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        (("red", "spout"), ("cannot measure 'spout'", "convex edge")),
+        (("red", "Red"), ("'Red'", "twice")),
+        (("red", " "), ("' '",)),
+        ((), ("empty",)),
+    ],
+)
+def test_a_vocabulary_that_cannot_be_measured_is_refused(
+    labels: tuple[str, ...], words: tuple[str, ...], attributes: SaliencyBackend
+) -> None:
+    with pytest.raises(ConfigError) as refusal:
+        attributes.labels_for(labels)
+    assert all(word in str(refusal.value) for word in words)
+
+
+def test_there_are_no_weights_to_load() -> None:
+    with pytest.raises(ConfigError, match="no weights"):
+        open_backend("attributes", BackendOptions(weights="large"))

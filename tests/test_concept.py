@@ -221,7 +221,6 @@ def test_a_model_of_another_backend_or_other_settings_is_refused_and_told_how_to
     for other in (
         replace(can_model, backend="clip", fingerprint="clip-aa"),
         replace(can_model, fingerprint="attributes-000000000000"),
-        replace(can_model, labels=("red", "flat")),
     ):
         with pytest.raises(ModelError, match=r"python -m reference \.\.\. --backend attributes") as caught:
             other.require_backend(attributes)

@@ -16,7 +16,7 @@ from tracker.cloud import CloudConfig, PointCloud, lift
 from tracker.errors import OnboardingError
 from tracker.frame import Frame, PosedFrame
 from tracker.geometry import Floats, Intrinsics, Pose
-from tracker.saliency import SaliencyBackend
+from tracker.saliency import Query, SaliencyBackend
 from tracker.view import ViewConfig, view_object
 
 AHEAD = Pose(np.eye(3), np.array([0.0123, -0.0071, 0.3952]))  # nothing falls on the border of a voxel
@@ -33,7 +33,8 @@ def balls(globe: Callable[..., PosedFrame]) -> list[PosedFrame]:
 def clouds(balls: list[PosedFrame], attributes: SaliencyBackend) -> list[PointCloud]:
     views = [view_object(ball.frame, ball.mask, 0.1, ViewConfig()) for ball in balls]
     seen = [view for view in views if view is not None]
-    return [lift(view, maps, CloudConfig()) for view, maps in zip(seen, attributes(seen), strict=True)]
+    saliency = attributes([Query(view, attributes.labels_for(None)) for view in seen])
+    return [lift(view, maps, CloudConfig()) for view, maps in zip(seen, saliency, strict=True)]
 
 
 def blind(T_cam_obj: Pose) -> PosedFrame:

@@ -57,8 +57,10 @@ class ConceptModel:
         return len(self.points)
 
     def require_backend(self, backend: SaliencyBackend) -> None:
-        """Raises ModelError unless this backend measured the model, with the settings that it has now."""
-        if (self.fingerprint, self.labels) != (backend.fingerprint, backend.labels):
+        """Raises ModelError unless this backend measured the model, with the settings that it has now.
+
+        Labels are no part of that: a backend finds those that the model asks for."""
+        if self.fingerprint != backend.fingerprint:
             raise ModelError(
                 f"the model of {self.object_id!r} was made by backend {self.backend} ({self.fingerprint}), "
                 f"it cannot be tracked with {backend.name} ({backend.fingerprint}): make it again with "

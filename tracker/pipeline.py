@@ -21,7 +21,7 @@ from tracker.pose_filter import PoseFilter
 from tracker.refinement import Refined, Refiner
 from tracker.registration import register
 from tracker.result import TrackResult, TrackState
-from tracker.saliency import SaliencyBackend, open_backend
+from tracker.saliency import Query, Saliency, SaliencyBackend, open_backend
 from tracker.stopwatch import Stopwatch
 from tracker.verification import Evidence, Verifier
 from tracker.view import ObjectView, view_object
@@ -51,7 +51,8 @@ class ObjectTracker:
         backend = backend or open_backend(models[0].backend)
         for model in models:
             model.require_backend(backend)
-        self._tracks = [_Track(model, config, backend) for model in models]
+        self._backend = backend
+        self._tracks = [_Track(model, config) for model in models]
         self._last_stamp_ns = -1
 
     def step(self, frame: Frame) -> tuple[TrackResult, ...]:
@@ -62,7 +63,28 @@ class ObjectTracker:
                 f"the last one, {self._last_stamp_ns} ns"
             )
         self._last_stamp_ns = frame.stamp_ns
-        return tuple(track.step(frame) for track in self._tracks)
+        clocks = [Stopwatch() for _ in self._tracks]
+
+        # What does the frame show of each object, and where are its concepts? One batch for all objects.
+        views = [track.view(frame, clock) for track, clock in zip(self._tracks, clocks, strict=True)]
+        saliency = self._saliency(views, clocks)
+
+        # Where is each object?
+        return tuple(
+            track.step(frame, view, maps, clock)
+            for track, view, maps, clock in zip(self._tracks, views, saliency, clocks, strict=True)
+        )
+
+    def _saliency(self, views: Sequence[ObjectView | str], clocks: Sequence[Stopwatch]) -> list[Saliency | None]:
+        """Of every view that there is."""
+        queries = {
+            k: Query(view, self._tracks[k].labels) for k, view in enumerate(views) if isinstance(view, ObjectView)
+        }
+        found: dict[int, Saliency] = {}
+        if queries:
+            with Stopwatch.shared([clocks[k] for k in queries], "saliency"):
+                found = dict(zip(queries, self._backend(list(queries.values())), strict=True))
+        return [found.get(k) for k in range(len(views))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,8 +106,8 @@ class _Hypothesis:
 class _Track:
     """One object's stages and its state between frames."""
 
-    def __init__(self, model: ConceptModel, config: TrackerConfig, backend: SaliencyBackend) -> None:
-        self._model, self._config, self._backend = model, config, backend
+    def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
+        self._model, self._config = model, config
         self._device = config.torch_device
         self._match = Matcher(model, config.matching, self._device)
         self._closest = ClosestPoints(model, config.closest_points)
@@ -94,13 +116,30 @@ class _Track:
         self._filter = PoseFilter(config.filter)
         self._state = TrackState.INITIALISING
 
-    def step(self, frame: Frame) -> TrackResult:
-        clock = Stopwatch()
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return self._model.labels
 
-        # 1. What does the frame show of the object?
-        sight = self._look(frame, clock)
-        if isinstance(sight, str):
-            return self._lost(frame, sight, clock)
+    def view(self, frame: Frame, clock: Stopwatch) -> ObjectView | str:
+        """What the frame shows of the object, or the reason why it shows nothing."""
+        mask = frame.masks.get(self._model.object_id)
+        if mask is None:
+            return f"no mask of object {self._model.object_id!r} was given"
+        if not mask.any():
+            return "out of view: the mask is empty"
+        with clock("view"):
+            view = view_object(frame, mask, self._model.diameter_m, self._config.view)
+        return "no depth within the mask" if view is None else view
+
+    def step(self, frame: Frame, view: ObjectView | str, saliency: Saliency | None, clock: Stopwatch) -> TrackResult:
+        # 1. Which points of the object does the frame show, and what is each of them?
+        if isinstance(view, str) or saliency is None:
+            return self._lost(frame, str(view), clock)
+        with clock("cloud"):
+            cloud = lift(view, saliency, self._config.cloud)
+            sight = _Sight(view, cloud, view_appearance(view))
+        if len(cloud) < LEAST_POINTS:
+            return self._lost(frame, f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed", clock)
 
         # 2. Which of its points is which point of the model?
         with clock("matching"):
@@ -116,26 +155,6 @@ class _Track:
 
         # 4. What does that say about its pose, given where it has been?
         return self._tracked(frame, found, clock)
-
-    def _look(self, frame: Frame, clock: Stopwatch) -> _Sight | str:
-        """The object's view, cloud and colours, or the reason why there are none."""
-        mask = frame.masks.get(self._model.object_id)
-        if mask is None:
-            return f"no mask of object {self._model.object_id!r} was given"
-        if not mask.any():
-            return "out of view: the mask is empty"
-        with clock("view"):
-            view = view_object(frame, mask, self._model.diameter_m, self._config.view)
-        if view is None:
-            return "no depth within the mask"
-        with clock("saliency"):
-            saliency = self._backend([view])[0]
-        with clock("cloud"):
-            cloud = lift(view, saliency, self._config.cloud)
-            appearance = view_appearance(view)
-        if len(cloud) < LEAST_POINTS:
-            return f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
-        return _Sight(view, cloud, appearance)
 
     def _expected(
         self, frame: Frame, sight: _Sight, correspondences: Correspondences, clock: Stopwatch

@@ -51,22 +51,36 @@ class Saliency:
         return out
 
 
-class SaliencyBackend(Protocol):
-    """Finds concepts in views of objects; several views at once may share a batch.
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """Where in this view is each of these L concepts?"""
 
-    name: as in `--backend`. labels: the L concepts that it maps. fingerprint: changes whenever its maps would.
+    view: ObjectView
+    labels: tuple[str, ...]
+
+
+class SaliencyBackend(Protocol):
+    """Finds concepts in views of objects; queries of several objects or frames at once may share a batch.
+
+    name: as in `--backend`. fingerprint: changes whenever its maps of the same query would.
     """
 
     @property
     def name(self) -> str: ...
 
     @property
-    def labels(self) -> tuple[str, ...]: ...
-
-    @property
     def fingerprint(self) -> str: ...
 
-    def __call__(self, views: Sequence[ObjectView]) -> list[Saliency]: ...
+    def labels_for(self, wanted: Sequence[str] | None) -> tuple[str, ...]:
+        """The labels to ask for when a model is to hold these concepts; None leaves the choice to the backend.
+
+        Raises ConfigError where it cannot find one of them in any picture.
+        """
+        ...
+
+    def __call__(self, queries: Sequence[Query]) -> list[Saliency]:
+        """One Saliency a query, whose labels are the query's."""
+        ...
 
 
 def fingerprint_of(name: str, settings: str) -> str:
@@ -74,17 +88,45 @@ def fingerprint_of(name: str, settings: str) -> str:
     return f"{name}-{hashlib.sha256(settings.encode()).hexdigest()[:12]}"
 
 
-def _attributes() -> SaliencyBackend:
+def require_labels(labels: Sequence[str]) -> tuple[str, ...]:
+    """Raises ConfigError unless there are labels, each with a text, no two alike."""
+    known: set[str] = set()
+    for label in labels:
+        if not label.strip():
+            raise ConfigError(f"a concept's label has a text, got {label!r} among {len(labels)}")
+        if label.strip().casefold() in known:
+            raise ConfigError(f"two concepts are called {label!r}: a vocabulary has no label twice")
+        known.add(label.strip().casefold())
+    if not labels:
+        raise ConfigError("the vocabulary is empty: expected at least one concept")
+    return tuple(labels)
+
+
+@dataclass(frozen=True, slots=True)
+class BackendOptions:
+    """What a backend with weights is opened with.
+
+    weights: a size it has a name for, a model's name on the hub, or a folder; None is the paper's choice.
+    device: "auto" is CUDA where there is one.
+    """
+
+    weights: str | None = None
+    device: str = "auto"
+
+
+def _attributes(options: BackendOptions) -> SaliencyBackend:
     from tracker.saliency.attributes import Attributes
 
+    if options.weights is not None:
+        raise ConfigError(f"backend attributes measures, it has no weights to load; got {options.weights!r}")
     return Attributes()
 
 
-BACKENDS: dict[str, Callable[[], SaliencyBackend]] = {"attributes": _attributes}
+BACKENDS: dict[str, Callable[[BackendOptions], SaliencyBackend]] = {"attributes": _attributes}
 
 
-def open_backend(name: str) -> SaliencyBackend:
+def open_backend(name: str, options: BackendOptions | None = None) -> SaliencyBackend:
     """The backend of this name. Raises ConfigError that lists those that there are."""
     if name not in BACKENDS:
         raise ConfigError(f"there is no saliency backend {name!r}; expected one of {', '.join(BACKENDS)}")
-    return BACKENDS[name]()
+    return BACKENDS[name](options or BackendOptions())

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from tracker.saliency import Saliency, fingerprint_of
+from tracker.errors import ConfigError
+from tracker.saliency import Query, Saliency, fingerprint_of, require_labels
 from tracker.view import Float32s, ObjectView
 
 # CIE L*a*b* (D65) of typical samples of the eleven basic colour terms of Berlin and Kay, Basic Color Terms, 1969.
@@ -45,28 +46,42 @@ BEND_FULL = (
 )
 
 
+TERMS = (
+    *(term + scale for scale in COLOUR_SCALES for term in COLOUR_TERMS),
+    *(term + scale for scale in RELATIVE_SCALES for term in RELATIVE_TERMS),
+    *SURFACE_TERMS,
+)
+LONGEST_FIRST = sorted(TERMS, key=len, reverse=True)  # "red nearby" is that, not "red" and something nearby
+
+
 class Attributes:
-    """The backend `attributes`. Works at the view's own resolution, a few milliseconds a view."""
+    """The backend `attributes`. Works at the view's own resolution, a few milliseconds a view.
+
+    A label may be one of its terms, or a phrase that has some of them in it: "red handle" is where it is red.
+    """
 
     name = "attributes"
-    labels = (
-        *(term + scale for scale in COLOUR_SCALES for term in COLOUR_TERMS),
-        *(term + scale for scale in RELATIVE_SCALES for term in RELATIVE_TERMS),
-        *SURFACE_TERMS,
-    )
     fingerprint = fingerprint_of(
         "attributes",
         repr((COLOUR_TERMS, LIGHTNESS_WEIGHT, COLOUR_SOFTNESS, COLOUR_SCALES, RELATIVE_SCALES, RELATIVE_FULL))
         + repr((SURFACE_TERMS, SURFACE_WEIGHT, EDGE_SCALE, FORM_SCALE, BEND_FULL)),
     )
 
-    def __call__(self, views: Sequence[ObjectView]) -> list[Saliency]:
-        return [self._maps(view) for view in views]
+    def labels_for(self, wanted: Sequence[str] | None) -> tuple[str, ...]:
+        if wanted is None:
+            return TERMS
+        for label in require_labels(wanted):
+            if not terms_in(label):
+                raise ConfigError(f"backend attributes cannot measure {label!r}; it knows {', '.join(TERMS)}")
+        return tuple(wanted)
 
-    def _maps(self, view: ObjectView) -> Saliency:
-        weights = view.inside.astype(np.float32)
+    def __call__(self, queries: Sequence[Query]) -> list[Saliency]:
+        return [self._maps(query) for query in queries]
+
+    def _maps(self, query: Query) -> Saliency:
+        view, weights = query.view, query.view.inside.astype(np.float32)
         lab = smooth_inside(lab_of(view.rgb), weights, 0.7)  # pixel noise is not a concept
-        maps = np.concatenate(
+        measured = np.concatenate(
             (
                 _colour_maps(lab, weights, view.pixels_across),
                 _relative_maps(lab, weights, view.pixels_across),
@@ -74,7 +89,20 @@ class Attributes:
             ),
             axis=2,
         )
-        return Saliency(self.labels, np.ascontiguousarray(np.moveaxis(maps * weights[:, :, None], 2, 0)), view.box)
+        maps = np.ascontiguousarray(np.moveaxis(measured * weights[:, :, None], 2, 0))
+        if query.labels != TERMS:
+            maps = np.stack([maps[[TERMS.index(t) for t in terms_in(label)]].prod(axis=0) for label in query.labels])
+        return Saliency(query.labels, maps, view.box)
+
+
+def terms_in(label: str) -> tuple[str, ...]:
+    """The measurable terms of a phrase, each word of it in one of them at most."""
+    text, found = f" {' '.join(label.casefold().split())} ", []
+    for term in LONGEST_FIRST:
+        if f" {term} " in text:
+            found.append(term)
+            text = text.replace(f" {term} ", " | ", 1)
+    return tuple(found)
 
 
 def lab_of(rgb: Float32s) -> Float32s:
