@@ -57,16 +57,7 @@ def test_the_true_pose_of_the_can_scores_far_above_wrong_ones(
     assert all(judged(can_model, wrong, view).score < right.score - 0.15 for wrong in wrong_poses(truth))
 
 
-@pytest.mark.parametrize(
-    "angle_deg",
-    [
-        *(-20, 20, 40, 90),
-        *(
-            pytest.param(angle, marks=pytest.mark.xfail(strict=True, reason="the can's unknown side is not asked for"))
-            for angle in (-120, -90)
-        ),
-    ],
-)
+@pytest.mark.parametrize("angle_deg", [-120, -90, -20, 20, 40, 90])
 def test_the_true_pose_of_the_can_scores_above_one_turned_about_its_axis(
     angle_deg: float, can_scene: SyntheticScene, can_model: ConceptModel, can_frames: list[Frame]
 ) -> None:
@@ -172,9 +163,9 @@ def test_colour_tells_the_can_from_the_can_turned_about_its_axis(
     right, wrong = judged(can_model, can_truth, can_view), judged(can_model, around, can_view)
     assert wrong.surface > 0.7 * right.surface
     assert wrong.colour < 0.85 * right.colour
-    shape_alone = VerificationConfig(colour_share=0)
+    shape_alone = VerificationConfig(colour_share=0, unexplained_weight=0)
     assert judged(can_model, around, can_view, shape_alone).score == pytest.approx(wrong.surface)
-    assert wrong.score < 0.85 * right.score
+    assert wrong.score < 0.9 * right.score
 
 
 def test_exposure_and_white_balance_cost_little(

@@ -17,7 +17,8 @@ from tracker.view import ObjectView
 class VerificationConfig(BaseModel):
     """model_points: how many are looked at. depth_sigma: distance at which a surface still agrees, as a share of the
     diameter, at least depth_sigma_least_m. lab_sigma: colour difference at which it still agrees. colour_share: share
-    of the score that colour decides; geometry decides the rest."""
+    of the score that colour decides; geometry decides the rest. unexplained_weight: how much a pixel of the object that
+    the model does not account for counts, against one that it gets wrong: the model may not know that side."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -26,14 +27,17 @@ class VerificationConfig(BaseModel):
     depth_sigma_least_m: float = Field(default=0.003, gt=0)
     lab_sigma: float = Field(default=14.0, gt=0)
     colour_share: float = Field(default=0.7, ge=0, le=1)
+    unexplained_weight: float = Field(default=0.5, ge=0, le=1)
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour.
+    """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour, lowered by the
+    share of the object that the pose leaves unexplained.
     surface: the same in place alone. colour: agreement of the colours where the place agrees.
     seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
-    outside the mask. hidden: share of the camera-facing model that something in front hides."""
+    outside the mask. hidden: share of the camera-facing model that something in front hides. explained: share of the
+    object's measured pixels on which a part of the model lies in place."""
 
     score: float
     surface: float
@@ -41,9 +45,11 @@ class Evidence:
     seen_through: float
     outside: float
     hidden: float
+    explained: float
 
 
-NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+CELL_PX = 3  # the sampled points of a surface that lies there leave no cell of this size empty
 
 
 class Verifier:
@@ -77,13 +83,17 @@ class Verifier:
         surface = weights * in_place * np.exp(-0.5 * (behind_m / self._sigma_m) ** 2)
         colour = self._colour_agreement(appearance.lab[0][rows, columns], in_place)
         colour_share = self._config.colour_share
+        agreed = float((surface * (1 - colour_share + colour_share * colour)).sum() / total)
+        explained = _explained(rows[in_place], columns[in_place], view)
+        unexplained = self._config.unexplained_weight * (1 - explained)
         return Evidence(
-            score=float((surface * (1 - colour_share + colour_share * colour)).sum() / total),
+            score=agreed * explained / max(explained + unexplained, 1e-9),
             surface=float(surface.sum() / total),
             colour=float((surface * colour).sum() / max(surface.sum(), 1e-9)),
             seen_through=float((weights * (on_object & (behind_m > reach_m))).sum() / total),
             outside=float((weights * ~on_object).sum() / total),
             hidden=float((at.facing * hidden).sum() / (at.facing * faces).sum()),
+            explained=explained,
         )
 
     def _colour_agreement(self, lab: np.ndarray, in_place: np.ndarray) -> np.ndarray:
@@ -94,6 +104,17 @@ class Verifier:
         difference = np.linalg.norm((lab - self._lab - offset) * (0.6, 1, 1), axis=1)
         drift = np.linalg.norm(offset * (0.3, 1, 1))
         return np.exp(-0.5 * (difference / self._config.lab_sigma) ** 2 - 0.5 * (drift / 25) ** 2)
+
+
+def _explained(rows: np.ndarray, columns: np.ndarray, view: ObjectView) -> float:
+    """Share of the object's measured pixels in whose cell there is one of these pixels (N,)."""
+    height, width = view.depth_m.shape
+    across = width // CELL_PX + 1
+    cells = (height // CELL_PX + 1) * across
+    measured = np.nonzero(view.has_depth)
+    area = np.bincount(measured[0] // CELL_PX * across + measured[1] // CELL_PX, minlength=cells)
+    met = np.bincount(rows // CELL_PX * across + columns // CELL_PX, minlength=cells) > 0
+    return float(area[met].sum() / max(area.sum(), 1))
 
 
 def _frame_depth_m(points_cam: np.ndarray, view: ObjectView) -> np.ndarray:
