@@ -1,12 +1,9 @@
-"""Correspondences, most of them wrong -> a few candidate poses, by RANSAC over three-point samples.
-
-All samples are drawn at once; those whose triangles differ in an edge or in the angle of two normals are dropped
-before anything is solved; the rest are solved in closed form, scored, told apart, and fitted again to their inliers.
-"""
+"""Correspondences, most of them wrong -> a few candidate poses, each with the share of them that supports it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, log
 
 import numpy as np
 import torch
@@ -15,29 +12,43 @@ from pydantic import BaseModel, ConfigDict, Field
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
 from tracker.geometry import Pose
+from tracker.hypotheses import Pairs, sampled, seeded, squared_distances, support
 from tracker.matching import Correspondences
+from tracker.umeyama import Motions, no_motions, umeyama_of_shared
+
+FIRST_BATCH = 8192  # samples before the first look at whether more are needed; every further batch is twice as large
+REFITS = 10
 
 
 class RegistrationConfig(BaseModel):
     """The paper's RANSAC and what is done to make it quick.
 
-    samples: three-point samples drawn (the paper's 100,000). threshold_m: distance at which a correspondence is an
-    inlier (the paper's 0.01 m). shortest_edge: a triangle's least edge, as a share of the diameter. normal_cosine:
-    how far the cosine between two normals may differ. solved: samples that are solved at most. scored_points:
-    correspondences on which those are scored. refitted: best of them that are scored on all. candidates: distinct
-    poses that are returned at most. distinct_rad, distinct_share: poses nearer than this angle and this share of the
-    diameter are one.
+    samples: three-point samples drawn at most (the paper's 100,000). confidence: with which a pose of the best one's
+    support has been sampled free of outliers when sampling stops; 1 draws all. threshold_m: distance at which a
+    correspondence is an inlier (the paper's 0.01 m). slack: of an edge's length, in thresholds. shortest_edge: a
+    triangle's least edge, as a share of the diameter. normal_cosine: how far the cosine between two normals may
+    differ. solved: samples that are solved at most. scored_points: correspondences on which those are scored.
+    rescored: best of them that are scored on all. seeding_below: support, as a share of the correspondences, under
+    which spatial compatibility is tried too; seeding_points, seeds, group: pairs compared, groups grown, their size.
+    candidates: distinct poses that are returned at most. distinct_rad, distinct_share: poses nearer than this angle
+    and this share of the diameter are one.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     samples: int = Field(default=100_000, ge=1)
+    confidence: float = Field(default=0.999, gt=0, le=1)
     threshold_m: float = Field(default=0.01, gt=0)
+    slack: float = Field(default=1.5, gt=0)
     shortest_edge: float = Field(default=0.12, ge=0, lt=1)
     normal_cosine: float = Field(default=0.4, gt=0, le=2)
     solved: int = Field(default=4000, ge=1)
     scored_points: int = Field(default=300, ge=10)
-    refitted: int = Field(default=300, ge=1)
+    rescored: int = Field(default=64, ge=1)
+    seeding_below: float = Field(default=0.05, ge=0, le=1)
+    seeding_points: int = Field(default=2000, ge=10)
+    seeds: int = Field(default=200, ge=1)
+    group: int = Field(default=12, ge=3)
     candidates: int = Field(default=12, ge=1)
     distinct_rad: float = Field(default=0.2, gt=0)
     distinct_share: float = Field(default=0.12, gt=0)
@@ -51,21 +62,6 @@ class Candidate:
     inlier_share: float
 
 
-def umeyama(source: torch.Tensor, target: torch.Tensor, weights: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Rotations (B, 3, 3) and translations (B, 3) of least weighted squared error, target = R source + t.
-
-    source, target: (B, N, 3); weights: (B, N) not negative. Without scale. Umeyama, TPAMI 1991, Eqs. 40-43.
-    """
-    share = (weights / weights.sum(dim=1, keepdim=True).clamp_min(1e-12)).unsqueeze(2)
-    centre_s, centre_t = (share * source).sum(dim=1, keepdim=True), (share * target).sum(dim=1, keepdim=True)
-    covariance = (share * (target - centre_t)).transpose(1, 2) @ (source - centre_s)
-    u, _, vt = torch.linalg.svd(covariance)
-    sign = torch.ones_like(u[:, 0])
-    sign[:, 2] = torch.det(u @ vt)
-    rotation = (u * sign.unsqueeze(1)) @ vt
-    return rotation, (centre_t - centre_s @ rotation.transpose(1, 2)).squeeze(1)
-
-
 def register(
     correspondences: Correspondences,
     cloud: PointCloud,
@@ -74,97 +70,95 @@ def register(
     generator: torch.Generator,
 ) -> list[Candidate]:
     """Up to `config.candidates` distinct poses, the best supported first. None where no three points fit together."""
-    if len(correspondences) < 3:
-        return []
-    device = generator.device
     q, m = correspondences.query_index, correspondences.model_index
     arrays = (cloud.points[q], cloud.normals[q], model.points[m], model.normals[m])
-    pairs = _Pairs(*(torch.from_numpy(np.ascontiguousarray(a, np.float32)).to(device) for a in arrays))
-    triples = _congruent_triples(pairs, config, model.diameter_m, generator)
-    if len(triples) == 0:
-        return []
-    ones = torch.ones(triples.shape, device=device)
-    rotation, translation = umeyama(pairs.model_points[triples], pairs.points[triples], ones)
-    subset = torch.randperm(len(correspondences), generator=generator, device=device)[: config.scored_points]
-    best = pairs.support(rotation, translation, subset, config.threshold_m).topk(min(config.refitted, len(triples)))
-    rotation, translation = rotation[best.indices], translation[best.indices]
-    distinct = _distinct(rotation, translation, model, config)
-    return _refit(pairs, rotation[distinct], translation[distinct], config)
+    pairs = Pairs(*(torch.from_numpy(np.ascontiguousarray(a, np.float32)).to(generator.device) for a in arrays))
+    return register_pairs(pairs, model.diameter_m, config, generator)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pairs:
-    """Corresponding points and normals, (M, 3) each: of the cloud (camera) and of the model (object)."""
-
-    points: torch.Tensor
-    normals: torch.Tensor
-    model_points: torch.Tensor
-    model_normals: torch.Tensor
-
-    def support(
-        self, rotation: torch.Tensor, translation: torch.Tensor, subset: torch.Tensor, threshold_m: float
-    ) -> torch.Tensor:
-        """(B,) how well each pose explains a subset of the pairs: truncated squared distances, normals agreeing."""
-        moved = self.model_points[subset] @ rotation.transpose(1, 2) + translation.unsqueeze(1)
-        squared = ((moved - self.points[subset]) ** 2).sum(dim=2)
-        turned = self.model_normals[subset] @ rotation.transpose(1, 2)
-        same_side = (turned * self.normals[subset]).sum(dim=2) > 0.5
-        return ((1 - squared / threshold_m**2).clamp_min(0) * same_side).sum(dim=1)
-
-
-def _congruent_triples(
-    pairs: _Pairs, config: RegistrationConfig, diameter_m: float, generator: torch.Generator
-) -> torch.Tensor:
-    """(B, 3) samples whose triangles in the cloud and in the model are congruent up to noise."""
-    count = len(pairs.points)
-    triples = torch.randint(count, (config.samples, 3), generator=generator, device=generator.device)
-    slack_m, shortest_m = 1.5 * config.threshold_m, config.shortest_edge * diameter_m
-    for i, j in ((0, 1), (1, 2), (2, 0)):  # edge by edge: the second test sees only what passes the first
-        a, b = triples[:, i], triples[:, j]
-        edge = (pairs.points[a] - pairs.points[b]).norm(dim=1)
-        model_edge = (pairs.model_points[a] - pairs.model_points[b]).norm(dim=1)
-        bend = (pairs.normals[a] * pairs.normals[b]).sum(dim=1)
-        model_bend = (pairs.model_normals[a] * pairs.model_normals[b]).sum(dim=1)
-        fits = ((edge - model_edge).abs() < slack_m) & (edge > shortest_m)
-        triples = triples[fits & ((bend - model_bend).abs() < config.normal_cosine)]
-    return triples[: config.solved]
-
-
-def _distinct(
-    rotation: torch.Tensor, translation: torch.Tensor, model: ConceptModel, config: RegistrationConfig
-) -> list[int]:
-    """Indices of poses, best first, of which no two are alike in angle and in where they put the model's centre."""
-    centre = torch.from_numpy(model.points.mean(axis=0)).to(rotation)
-    places = rotation @ centre + translation
-    trace = torch.einsum("aij,bij->ab", rotation, rotation)
-    alike = trace > 1 + 2 * np.cos(config.distinct_rad)
-    alike &= torch.cdist(places, places) < config.distinct_share * model.diameter_m
-    chosen: list[int] = []
-    for k, row in enumerate(alike.cpu().numpy()):
-        if not row[chosen].any():
-            chosen.append(k)
-        if len(chosen) == config.candidates:
-            break
-    return chosen
-
-
-def _refit(
-    pairs: _Pairs, rotation: torch.Tensor, translation: torch.Tensor, config: RegistrationConfig
+def register_pairs(
+    pairs: Pairs, diameter_m: float, config: RegistrationConfig, generator: torch.Generator
 ) -> list[Candidate]:
-    """Fit every pose to its inliers until they hardly change, and count them."""
-    inliers = torch.zeros((len(rotation), len(pairs.points)), device=rotation.device)
-    for _ in range(3):
-        moved = pairs.model_points @ rotation.transpose(1, 2) + translation.unsqueeze(1)
-        inliers = ((moved - pairs.points).norm(dim=2) < config.threshold_m).float()
-        enough = inliers.sum(dim=1) >= 3
-        fitted_rotation, fitted_translation = umeyama(
-            pairs.model_points.expand(len(rotation), -1, -1), pairs.points.expand(len(rotation), -1, -1), inliers
+    """`register` for corresponding points themselves, wherever their origin is."""
+    if len(pairs) < 3:
+        return []
+    centre, model_centre = pairs.points.double().mean(dim=0), pairs.model_points.double().mean(dim=0)
+    centred = Pairs(
+        (pairs.points.double() - centre).float(), pairs.normals,
+        (pairs.model_points.double() - model_centre).float(), pairs.model_normals,
+    )  # fmt: skip
+    motions = _hypotheses(centred, diameter_m, config, generator)
+    if len(motions) == 0:
+        return []
+    motions = motions[_distinct(motions, diameter_m, 2 * config.candidates, config)]
+    motions, inliers = _refit(centred, motions, config)
+    chosen = _distinct(motions, diameter_m, config.candidates, config)
+    rotation = motions.rotation[chosen].double()
+    translation = motions.translation[chosen].double() + centre - rotation @ model_centre
+    return [
+        Candidate(Pose(R, t), share)
+        for R, t, share in zip(
+            rotation.cpu().numpy(), translation.cpu().numpy(), inliers[chosen].cpu().tolist(), strict=True
         )
-        rotation = torch.where(enough[:, None, None], fitted_rotation, rotation)
-        translation = torch.where(enough[:, None], fitted_translation, translation)
-    share = inliers.mean(dim=1).cpu().numpy()
-    poses = [
-        Pose(r, t) for r, t in zip(rotation.double().cpu().numpy(), translation.double().cpu().numpy(), strict=True)
     ]
-    found = [Candidate(pose, float(s)) for pose, s in zip(poses, share, strict=True)]
-    return sorted(found, key=lambda c: -c.inlier_share)
+
+
+def _hypotheses(pairs: Pairs, diameter_m: float, config: RegistrationConfig, generator: torch.Generator) -> Motions:
+    """Motions, best first."""
+    slack_m, shortest_m = config.slack * config.threshold_m, config.shortest_edge * diameter_m
+    subset = pairs[torch.randperm(len(pairs), generator=generator, device=generator.device)[: config.scored_points]]
+    pool, scores, drawn = no_motions(pairs.points), pairs.points[:0, 0], 0
+    batch = FIRST_BATCH if config.confidence < 1 else config.samples
+    while drawn < min(config.samples, _needed(_best(scores), len(subset), config)):
+        batch = min(batch, config.samples - drawn)
+        found = sampled(pairs, batch, slack_m, shortest_m, config.normal_cosine, config.solved, generator)
+        pool, drawn, batch = pool.joined(found), drawn + batch, 2 * batch
+        scores = torch.cat((scores, support(subset, found, config.threshold_m)))
+    if _best(scores) < config.seeding_below * len(subset):
+        limits = (config.normal_cosine, config.seeding_points, config.seeds, config.group)
+        found = seeded(pairs, slack_m, shortest_m, *limits, generator)
+        pool = pool.joined(found)
+        scores = torch.cat((scores, support(subset, found, config.threshold_m)))
+    order = scores.argsort(descending=True, stable=True)[: int((scores > 0).sum())]
+    finalists = order[: config.rescored]
+    exact = support(pairs, pool[finalists], config.threshold_m)
+    return pool[torch.cat((finalists[exact.argsort(descending=True, stable=True)], order[config.rescored :]))]
+
+
+def _best(scores: torch.Tensor) -> float:
+    return float(scores.amax()) if len(scores) else 0.0
+
+
+def _needed(best: float, points: int, config: RegistrationConfig) -> float:
+    """Samples after which one free of outliers was drawn, with this confidence, if the best score is of a true pose."""
+    share = min(best / points, 1 - 1e-9) ** 3
+    return log(1 - config.confidence) / log(1 - share) if config.confidence < 1 and share > 1e-12 else float("inf")
+
+
+def _distinct(motions: Motions, diameter_m: float, most: int, config: RegistrationConfig) -> torch.Tensor:
+    """Indices of up to `most` motions, in order, no two alike in angle and in where they put the model's centre."""
+    chosen: list[int] = []
+    free = torch.ones(len(motions), dtype=torch.bool, device=motions.rotation.device)
+    turns = motions.rotation.flatten(1)
+    while len(chosen) < most and bool(free.any()):
+        k = int(free.int().argmax())
+        chosen.append(k)
+        near = (motions.translation - motions.translation[k]).norm(dim=1) < config.distinct_share * diameter_m
+        free &= ~(near & (turns @ turns[k] > 1 + 2 * cos(config.distinct_rad)))
+        free[k] = False
+    return torch.tensor(chosen, dtype=torch.long, device=turns.device)
+
+
+def _refit(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> tuple[Motions, torch.Tensor]:
+    """Every motion fitted to its inliers until they hardly change, those left out that their inliers do not determine,
+    the best supported first; and the share (B,) of the pairs that are inliers of each."""
+    for _ in range(REFITS):
+        motions = umeyama_of_shared(pairs.model_points, pairs.points, _closeness(pairs, motions, config) ** 2)
+    kept = motions[motions.determined & ((_closeness(pairs, motions, config) > 0).sum(dim=1) > 2)]
+    kept = kept[support(pairs, kept, config.threshold_m).argsort(descending=True, stable=True)]
+    return kept, (_closeness(pairs, kept, config) > 0).float().mean(dim=1)
+
+
+def _closeness(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> torch.Tensor:
+    """(B, M) from 1 where a pair meets under a motion to 0 from the threshold on; its square is Tukey's weight."""
+    return (1 - squared_distances(pairs, motions) / config.threshold_m**2).clamp_min(0)

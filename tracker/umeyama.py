@@ -1,0 +1,103 @@
+"""Closed-form motions between corresponding points, many problems at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+
+LEAST_RANK = 1e-4  # second over first singular value: points nearer to a line than this leave the turn about it open
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motions:
+    """B motions, target = scale * rotation @ source + translation. rotation: (B, 3, 3). translation: (B, 3).
+    scale: (B,). determined: (B,) bool, False where the points lie on a line or in one place."""
+
+    rotation: torch.Tensor
+    translation: torch.Tensor
+    scale: torch.Tensor
+    determined: torch.Tensor
+
+    def __getitem__(self, chosen: torch.Tensor) -> Motions:
+        return Motions(self.rotation[chosen], self.translation[chosen], self.scale[chosen], self.determined[chosen])
+
+    def __len__(self) -> int:
+        return len(self.rotation)
+
+    def joined(self, other: Motions) -> Motions:
+        """These, then the others."""
+        return Motions(
+            torch.cat((self.rotation, other.rotation)),
+            torch.cat((self.translation, other.translation)),
+            torch.cat((self.scale, other.scale)),
+            torch.cat((self.determined, other.determined)),
+        )
+
+
+def no_motions(like: torch.Tensor) -> Motions:
+    """None at all, of a tensor's type and device."""
+    return Motions(like.new_zeros(0, 3, 3), like.new_zeros(0, 3), like.new_zeros(0), like.new_zeros(0) > 0)
+
+
+def umeyama(source: torch.Tensor, target: torch.Tensor, weights: torch.Tensor, with_scale: bool = False) -> Motions:
+    """Motions of least weighted squared error. source, target: (B, N, 3); weights: (B, N), not negative.
+
+    Scale is 1 unless asked for. Umeyama, TPAMI 1991, Eqs. 40-43.
+    """
+    share = (weights / weights.sum(dim=1, keepdim=True).clamp_min(1e-12)).unsqueeze(2)
+    centre_s, centre_t = (share * source).sum(dim=1), (share * target).sum(dim=1)
+    apart = source - centre_s.unsqueeze(1)
+    covariance = (target - centre_t.unsqueeze(1)).transpose(1, 2) @ (share * apart)
+    return _solved(covariance, centre_s, centre_t, (share * apart * apart).sum(dim=(1, 2)) if with_scale else None)
+
+
+def umeyama_of_shared(source: torch.Tensor, target: torch.Tensor, weights: torch.Tensor) -> Motions:
+    """`umeyama` where all problems have the same points (N, 3) about the origin and differ in their weights (B, N)
+    only: all sums are one matrix product."""
+    products = (target.unsqueeze(2) * source.unsqueeze(1)).flatten(1)
+    sums = weights @ torch.cat((torch.ones_like(source[:, :1]), source, target, products), dim=1)
+    centre_s, centre_t, second = (sums[:, 1:] / sums[:, :1].clamp_min(1e-12)).split((3, 3, 9), dim=1)
+    covariance = second.reshape(-1, 3, 3) - centre_t.unsqueeze(2) * centre_s.unsqueeze(1)
+    return _solved(covariance, centre_s, centre_t, None)
+
+
+def _solved(
+    covariance: torch.Tensor, centre_s: torch.Tensor, centre_t: torch.Tensor, variance_s: torch.Tensor | None
+) -> Motions:
+    u, singular, vt = torch.linalg.svd(covariance)
+    sign = torch.ones_like(singular)
+    sign[:, 2] = torch.det(u @ vt)
+    rotation = (u * sign.unsqueeze(1)) @ vt
+    scale = torch.ones_like(singular[:, 0])
+    if variance_s is not None:
+        scale = (singular * sign).sum(dim=1) / variance_s.clamp_min(1e-20)
+    moved = scale.unsqueeze(1) * (rotation @ centre_s.unsqueeze(2)).squeeze(2)
+    determined = (singular[:, 1] > LEAST_RANK * singular[:, 0]) & (singular[:, 0] > 0)
+    return Motions(rotation, centre_t - moved, scale, determined)
+
+
+def triangles(source: torch.Tensor, target: torch.Tensor) -> Motions:
+    """What `umeyama` finds for three points each, (B, 3, 3), that go round the same way, without a singular value
+    decomposition: one plane is laid on the other, then turned within it."""
+    centre_s, centre_t = source.mean(dim=1), target.mean(dim=1)
+    axes_s, axes_t = _axes(source), _axes(target)
+    flat_s = (source - centre_s.unsqueeze(1)) @ axes_s[:, :, :2]
+    flat_t = (target - centre_t.unsqueeze(1)) @ axes_t[:, :, :2]
+    cosine = (flat_s * flat_t).sum(dim=(1, 2))
+    sine = (flat_s[..., 0] * flat_t[..., 1] - flat_s[..., 1] * flat_t[..., 0]).sum(dim=1)
+    length = torch.hypot(cosine, sine)
+    cosine, sine = (cosine / length.clamp_min(1e-20))[:, None], (sine / length.clamp_min(1e-20))[:, None]
+    x, y, z = axes_t.unbind(dim=2)
+    turned = torch.stack((cosine * x + sine * y, cosine * y - sine * x, z), dim=2)
+    rotation = turned @ axes_s.transpose(1, 2)
+    translation = centre_t - (rotation @ centre_s.unsqueeze(2)).squeeze(2)
+    return Motions(rotation, translation, torch.ones_like(length), length > 0)
+
+
+def _axes(corners: torch.Tensor) -> torch.Tensor:
+    """(B, 3, 3) orthonormal columns: along the first edge, across it within the triangle, out of the triangle."""
+    edge, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    along = torch.nn.functional.normalize(edge, dim=1, eps=1e-20)
+    out = torch.nn.functional.normalize(torch.linalg.cross(edge, other), dim=1, eps=1e-20)
+    return torch.stack((along, torch.linalg.cross(out, along), out), dim=2)
