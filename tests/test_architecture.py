@@ -30,7 +30,10 @@ ORDER = {
         "projection", "least_squares", "closest_points", "registration", "verification", "refinement", "pose_filter",
         "config", "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
     ),
-    "reference": ("viewsphere", "cross_check", "keyframes", "fusion", "quality", "onboard", "__main__"),
+    "reference": (
+        "vocabulary", "prompts", "llm", "viewsphere", "cross_check", "keyframes", "fusion", "quality", "onboard",
+        "__main__",
+    ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}
 
