@@ -1,38 +1,23 @@
-"""Asking a language model for concepts, at any endpoint that speaks OpenAI's chat completions, and keeping its answers.
+"""Asking a language model for concepts, at any endpoint that speaks OpenAI's chat completions.
 
-An answer is data: it is parsed, checked and stored, never run. The API key is in no text that this module makes.
+An answer is data: it is parsed and checked, never run. The API key is in no text that this module makes.
 """
 
 from __future__ import annotations
 
 import base64
-import hashlib
-import json
-import logging
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
 
-from reference.prompts import NEED_A_PICTURE, check_request, complaint_for, labels_in, prompt_for
-from reference.vocabulary import (
-    LONGEST_TEXT,
-    Vocabulary,
-    VocabularySet,
-    complaint_about_text,
-    plain_name,
-    read_vocabulary,
-    write_vocabulary,
-)
-from tracker.errors import ConfigError, MissingExtraError, OutputError, VocabularyError
-
-logger = logging.getLogger(__name__)
+from reference.prompts import NEED_A_PICTURE, complaint_for, labels_in, prompt_for
+from reference.vocabulary import LONGEST_TEXT, Vocabulary, complaint_about_text
+from tracker.errors import ConfigError, MissingExtraError, VocabularyError
 
 OPENAI_URL = "https://api.openai.com/v1"
 VARIABLES = {"base_url": "OPENAI_BASE_URL", "model": "CONCEPTRACK_LLM_MODEL", "api_key": "OPENAI_API_KEY"}
@@ -58,13 +43,11 @@ class Endpoint:
     def __post_init__(self) -> None:
         if complaint := complaint_about_text(self.model, LONGEST_TEXT):
             raise ConfigError(f"name of the language model: {complaint}")
-        if not re.fullmatch(r"https?://[^\s/@?#]+(/[^\s@?#]*)?", self.base_url):
+        if not _is_address(self.base_url):
             # not shown: who writes a password into the address does not want to read it here
             raise ConfigError("address of the language model: expected one like https://host/v1, without user or query")
         if not re.fullmatch(r"[!-~]*", self.api_key):
-            raise ConfigError(
-                "the API key has characters that no key can have (spaces, line ends, letters with accents)"
-            )
+            raise ConfigError("the API key has characters that no key can have, such as spaces or line ends")
 
 
 def endpoint_from(options: Mapping[str, str | None], environment: Mapping[str, str]) -> Endpoint:
@@ -112,49 +95,10 @@ def ask_for_labels(
             labels = labels_in(answer, count)
         except ValueError as error_again:
             complaint, shown = _shown(str(error_again), endpoint), _shown(answer, endpoint)
-            raise VocabularyError(f"{endpoint.model} gave no labels, asked twice: {complaint}: {shown}") from None
+            raise VocabularyError(
+                f"{endpoint.model} gave no labels though asked twice ({complaint}): {shown}"
+            ) from None
     return Vocabulary(category, labels, kind, endpoint.model)
-
-
-def cached_vocabulary(
-    category: str,
-    kind: str,
-    count: int,
-    endpoint: Endpoint,
-    picture: np.ndarray | None = None,
-    folder: str | Path | None = None,
-) -> Vocabulary:
-    """As `ask_for_labels`, but asked once: the answer is kept in a YAML file that a person can edit, one for each
-    category, kind, count and model, and taken from there from then on.
-
-    folder: where, None for ~/.cache/conceptrack/vocabularies (under XDG_CACHE_HOME where that is set).
-    Raises ConfigError also where the file has been edited into something that is no vocabulary.
-    """
-    check_request(category, kind, count)
-    path = Path(folder or cache_folder(os.environ)) / f"{cache_slug(category, kind, count, endpoint.model)}.yaml"
-    if path.exists():
-        return read_vocabulary(str(path)).for_object(category)
-    vocabulary = ask_for_labels(category, kind, count, endpoint, picture)
-    try:
-        write_vocabulary(path, VocabularySet(category, (vocabulary,)))
-    except OutputError as error:  # the answer is good, it will only be asked for again
-        logger.warning("%s", error)
-    return vocabulary
-
-
-def cache_folder(environment: Mapping[str, str]) -> Path:
-    """Where answers are kept; a relative XDG_CACHE_HOME does not count, as its specification says."""
-    given = Path(environment.get("XDG_CACHE_HOME", ""))
-    return (given if given.is_absolute() else Path.home() / ".cache") / "conceptrack" / "vocabularies"
-
-
-def cache_slug(category: str, kind: str, count: int, model: str) -> str:
-    """A file name without its ending: what can be read of all four, and a hash that tells apart what cannot. Of the
-    letters a to z, digits and hyphens only, so whatever the texts are it names a file and no other folder."""
-    identity = [plain_name(category), kind, count, model]
-    words = re.sub(r"[^a-z0-9]+", "-", "-".join(map(str, identity)).lower()).strip("-")
-    digest = hashlib.sha256(json.dumps(identity).encode()).hexdigest()
-    return f"{words[:80].strip('-')}-{digest[:12]}"
 
 
 def _answer(messages: list[Any], endpoint: Endpoint) -> str:
@@ -196,11 +140,20 @@ def _answer(messages: list[Any], endpoint: Endpoint) -> str:
         raise VocabularyError(f"{model} refused to answer ({_shown(str(refusal or finished), endpoint)})")
     if finished == "length":
         raise VocabularyError(
-            f"the answer of {model} was cut off at the endpoint's limit: {_shown(str(text), endpoint)}"
+            f"the answer of {model} was cut off at its limit of length: {_shown(str(text), endpoint)}"
         )
     if not isinstance(text, str):
         raise VocabularyError(f"{model} answered without any text (finish_reason {finished!r})")
     return text
+
+
+def _is_address(url: str) -> bool:
+    try:
+        parts = urlsplit(url)
+        named = bool(parts.hostname) and parts.port != 0
+    except ValueError:
+        return False
+    return named and re.fullmatch(r"https?://[^\s@?#]+", url) is not None
 
 
 def _shown(text: str, endpoint: Endpoint) -> str:

@@ -7,7 +7,6 @@ on the shape, "affordance" for what can be done where, "adjective" for parts wit
 from __future__ import annotations
 
 import json
-import re
 
 from reference.vocabulary import LONGEST_LABEL, LONGEST_TEXT, complaint_about_labels, complaint_about_text
 from tracker.errors import ConfigError
@@ -41,11 +40,7 @@ Each will be searched for in pictures, to find out where on the object it is. Th
 {kind}{picture}
 Answer with nothing but a JSON list of exactly {count} strings, no two alike, none longer than {longest} characters."""
 PICTURE = "\nThe picture shows objects of this kind; use it to see what they look like."
-AGAIN = (
-    "That cannot be used: {complaint}. Answer again, with nothing but a JSON list of exactly {count} distinct strings."
-)
-
-_FENCED = re.compile(r"```(?:json)?[ \t]*\n(.*?)\n?[ \t]*```", re.DOTALL | re.IGNORECASE)
+AGAIN = "That cannot be used: {complaint}. Answer again, as a JSON list of exactly {count} distinct strings."
 
 
 def check_request(category: str, kind: str, count: int) -> None:
@@ -74,8 +69,8 @@ def labels_in(answer: str, count: int) -> tuple[str, ...]:
     """The labels in an answer: a JSON list, with or without a fence of ``` around it, of that many distinct short
     strings. Spaces around labels are dropped. Raises ValueError that says what else it is."""
     text = answer.strip()
-    if fenced := _FENCED.fullmatch(text):
-        text = fenced[1]
+    if len(text) > 6 and text.startswith("```") and text.endswith("```"):
+        text = text[3:-3].removeprefix("json")
     try:
         labels = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -51,7 +51,7 @@ class Vocabulary:
     @property
     def answers_to(self) -> frozenset[str]:
         """Its category and its ids, as `plain_name` writes them."""
-        return frozenset(plain_name(name) for name in (self.category, *self.ids))
+        return frozenset(plain_name(name) for name in (self.category, *self.ids)) - {""}
 
 
 @dataclass(frozen=True, slots=True)

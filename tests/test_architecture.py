@@ -31,8 +31,8 @@ ORDER = {
         "config", "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
     ),
     "reference": (
-        "vocabulary", "prompts", "llm", "viewsphere", "cross_check", "keyframes", "fusion", "quality", "onboard",
-        "__main__",
+        "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
+        "quality", "onboard", "__main__",
     ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}
