@@ -143,7 +143,7 @@ def _answer(messages: list[Any], endpoint: Endpoint) -> str:
             f"the answer of {model} was cut off at its limit of length: {_shown(str(text), endpoint)}"
         )
     if not isinstance(text, str):
-        raise VocabularyError(f"{model} answered without any text (finish_reason {finished!r})")
+        raise VocabularyError(f"{model} answered without any text ({_shown(str(finished), endpoint)})")
     return text
 
 

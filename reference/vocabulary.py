@@ -163,7 +163,7 @@ def write_vocabulary(path: str | Path, vocabularies: VocabularySet) -> None:
         for one in vocabularies.vocabularies
     ]
     content = {"name": vocabularies.name, "vocabularies": entries}
-    text = HEADER + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=4 * LONGEST_TEXT)
+    text = HEADER + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

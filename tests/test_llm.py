@@ -156,7 +156,7 @@ def test_a_key_that_the_model_answers_with_is_not_shown(model: Model) -> None:
     [
         (completion(None, refusal="I'd rather not"), r"gemini refused to answer (I'd rather not)"),
         (completion("", "content_filter"), "gemini refused to answer (content_filter)"),
-        (completion(None), "gemini answered without any text (finish_reason 'stop')"),
+        (completion(None), "gemini answered without any text (stop)"),
         (completion('["handle", "ri', "length"), "the answer of gemini was cut off at its limit of length"),
         (completion(GOOD, "length"), "the answer of gemini was cut off at its limit of length"),
         ({"choices": []}, "answered with something that is no chat completion"),
