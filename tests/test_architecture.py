@@ -31,7 +31,10 @@ ORDER = {
         "verification", "refinement", "pose_filter", "config", "result", "stopwatch", "pipeline", "output",
         "viewer", "terminal", "__main__",
     ),
-    "reference": ("viewsphere", "cross_check", "keyframes", "fusion", "quality", "onboard", "__main__"),
+    "reference": (
+        "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
+        "quality", "onboard", "__main__",
+    ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}
 

@@ -27,6 +27,10 @@ class ConfigError(TrackerError):
     """A setting that does not exist or whose value is out of range."""
 
 
+class VocabularyError(TrackerError):
+    """A language model that cannot be asked for concepts, or an answer of it that cannot be used."""
+
+
 class OutputError(TrackerError):
     """A result that cannot be written where it should go, or a result file that cannot be read."""
 
