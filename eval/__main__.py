@@ -28,7 +28,14 @@ class Track:
     objects: tuple[str, ...] | None = None
     """Only these objects."""
     backend: str = "attributes"
-    """Which saliency backend finds the concepts."""
+    """Which saliency backend finds the concepts; "siglip2+attributes" joins two."""
+    weights: str | None = None
+    """Weights of the backend: a size, a name on the hub, or a folder."""
+    device: str = "auto"
+    """Where the backend runs; auto is CUDA where there is one."""
+    vocabulary: str | None = None
+    """Concepts to look for: a set that comes along (general, ycbv, real275, linemod, toyota-light) or a YAML file.
+    Default: the backend's own."""
     views: int = 2
     """Reference frames an object and scene; they are not scored."""
     masks: Literal["visib"] = "visib"
@@ -54,10 +61,11 @@ class Track:
         from eval.predict import Protocol, track_dataset
         from eval.report import environment, table, write_html, write_scores
         from eval.score import score
+        from reference.vocabulary import read_vocabulary
         from tracker.config import dump_config, read_config
         from tracker.errors import ConfigError
         from tracker.output import result_folder
-        from tracker.saliency import open_backend
+        from tracker.saliency import BackendOptions, open_backend
         from tracker.viewer import NullViewer, OverlayVideo
 
         if self.view != "none" and self.out is None:
@@ -68,7 +76,9 @@ class Track:
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
         dataset = open_dataset(self.dataset)
-        protocol = Protocol(open_backend(self.backend), config, self.views, self.poses)
+        vocabularies = read_vocabulary(self.vocabulary) if self.vocabulary else None
+        backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
+        protocol = Protocol(backend, config, self.views, self.poses, vocabularies)
         scene_ids = dataset.scene_ids if self.scenes is None else self.scenes
         with ExitStack() as stack:
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
@@ -87,7 +97,9 @@ class Track:
                 object_ids=self.objects,
                 exclude=tracked.reference_frames,
                 protocol={
-                    "backend": f"{protocol.backend.name} ({protocol.backend.fingerprint})",
+                    "backend": f"{backend.name} ({backend.fingerprint})",
+                    "weights": self.weights or "the backend's default",
+                    "vocabulary": self.vocabulary or "the backend's own",
                     "views": self.views,
                     "masks": "the dataset's visible masks",
                     "prior": "on" if config.prior else "off",

@@ -14,6 +14,7 @@ from eval.datasets import Dataset
 from eval.instances import ObjectInImage
 from eval.score import TrackingCounts
 from reference.onboard import onboard, read_reference_frames
+from reference.vocabulary import VocabularySet
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import OnboardingError
@@ -33,12 +34,13 @@ Progress = Callable[[Iterable[Frame], int, str], Iterable[Frame]]
 @dataclass(frozen=True, slots=True)
 class Protocol:
     """How a dataset is tracked. views: reference frames an object and scene, picked from its own frames.
-    poses: which of a result's poses count."""
+    poses: which of a result's poses count. vocabularies: the concepts of each object, None for the backend's own."""
 
     backend: SaliencyBackend
     config: TrackerConfig
     views: int
     poses: Literal["filtered", "raw"] = "filtered"
+    vocabularies: VocabularySet | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +107,8 @@ def _onboard(
     for object_id in object_ids:
         try:
             frames = read_reference_frames(dataset.scene(scene_id), object_id, protocol.views)
-            models.append(onboard(frames, protocol.backend, config.view, config.cloud))
+            labels = protocol.vocabularies.for_object(object_id).labels if protocol.vocabularies else None
+            models.append(onboard(frames, protocol.backend, config.view, config.cloud, labels))
         except OnboardingError as error:
             log.warning("scene %d: %s", scene_id, error)
             tracked.refused[f"{scene_id}/{object_id}"] = str(error)

@@ -2,15 +2,50 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from rich.table import Table
 
 from tracker.terminal import STDERR, run
+
+if TYPE_CHECKING:
+    from tracker.concept import ConceptModel
+    from tracker.frame import PosedFrame
+
+
+@dataclass
+class Ask:
+    """Ask a language model for the concepts, at any endpoint that speaks OpenAI's protocol (extra llm)."""
+
+    category: str | None = None
+    """What the object is, for example "mug". Answers are kept and can be edited."""
+    kind: Literal["default", "geometric", "affordance", "adjective"] = "default"
+    """The paper's four prompts; all but the first send the first reference view along."""
+    concepts: int = 20
+    """How many concepts to ask for."""
+    url: str | None = None
+    """Base URL of the endpoint. Default: OPENAI_BASE_URL."""
+    model: str | None = None
+    """Name of the model there. Default: CONCEPTRACK_LLM_MODEL. The key is read from OPENAI_API_KEY."""
+
+    def labels(self, frames: Sequence[PosedFrame]) -> tuple[str, ...] | None:
+        from reference.llm import endpoint_from
+        from reference.vocabulary_cache import cached_vocabulary
+        from tracker.view import bounding_box
+
+        if self.category is None:
+            return None
+        endpoint = endpoint_from({"base_url": self.url, "model": self.model}, os.environ)
+        box, picture = bounding_box(frames[0].mask), None
+        if self.kind != "default" and box is not None:
+            picture = frames[0].frame.rgb[box.y0 : box.y1, box.x0 : box.x1]
+        return cached_vocabulary(self.category, self.kind, self.concepts, endpoint, picture).labels
 
 
 @dataclass
@@ -26,7 +61,17 @@ class Reference:
     views: Annotated[int, tyro.conf.arg(metavar="K")] = 2
     """How many reference frames to pick from the recording."""
     backend: str = "attributes"
-    """Which saliency backend finds the concepts."""
+    """Which saliency backend finds the concepts; "siglip2+attributes" joins two."""
+    weights: str | None = None
+    """Weights of the backend: a size, a name on the hub, or a folder."""
+    device: str = "auto"
+    """Where the backend runs; auto is CUDA where there is one."""
+    vocabulary: str | None = None
+    """Concepts to look for: a set that comes along (general, ycbv, real275, linemod, toyota-light) or a YAML file.
+    Default: the backend's own."""
+    ask: Ask = field(default_factory=Ask)
+    show: Literal["none", "concepts"] = "none"
+    """concepts: write a picture of the concepts' maps beside the model (mug.concept -> mug.concepts.png)."""
     config: Path | None = None
     """YAML file with settings that differ from the defaults (view and cloud are used here)."""
     overwrite: bool = False
@@ -34,31 +79,46 @@ class Reference:
 
     def __call__(self) -> None:
         from reference.onboard import onboard, read_reference_frames
+        from reference.plate import write_concept_plate
+        from reference.vocabulary import read_vocabulary
         from tracker.config import read_config
         from tracker.errors import ConfigError
         from tracker.output import require_free
-        from tracker.saliency import open_backend
+        from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import open_source
 
         if self.views < 1:
             raise ConfigError(f"--views: at least one reference frame is needed, got {self.views}")
-        require_free(self.out, self.overwrite)
-        config, backend = read_config(self.config), open_backend(self.backend)
+        if self.vocabulary is not None and self.ask.category is not None:
+            raise ConfigError("--vocabulary and --ask.category both name concepts: give one of them")
+        plate = self.out.with_suffix(".concepts.png") if self.show == "concepts" else None
+        for path in (self.out, plate):
+            if path is not None:
+                require_free(path, self.overwrite)
+        config = read_config(self.config)
+        labels = read_vocabulary(self.vocabulary).for_object(self.object).labels if self.vocabulary else None
+        backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
         source = open_source(self.source)
         frames = read_reference_frames(source, self.object, self.views)
-        model = onboard(frames, backend, config.view, config.cloud)
+        model = onboard(frames, backend, config.view, config.cloud, labels or self.ask.labels(frames))
         model.save(self.out)
-        quality = model.notes["quality"]
-        table = Table("", "", title=f"{self.out}", show_header=False)
-        table.add_row("object", model.object_id)
-        table.add_row("backend", f"{model.backend}, {len(model.labels)} concepts")
-        table.add_row("reference frames", "\n".join(model.notes["reference_frames"]))
-        table.add_row("diameter seen", f"{model.diameter_m * 1000:.0f} mm")
-        table.add_row("surface points", str(quality["points"]))
-        table.add_row("viewing sphere", f"{quality['coverage']:.0%} within 60 degrees of a reference view")
-        table.add_row("seen twice", f"{quality['shared']:.0%} of the points, agreeing to {quality['agreement']:.2f}")
-        table.add_row("missing", "\n".join(quality["problems"]) or "nothing")
-        STDERR.print(table)
+        if plate is not None:
+            write_concept_plate(plate, model, backend)
+        STDERR.print(_verdict(model, self.out))
+
+
+def _verdict(model: ConceptModel, path: Path) -> Table:
+    quality = model.notes["quality"]
+    table = Table("", "", title=f"{path}", show_header=False)
+    table.add_row("object", model.object_id)
+    table.add_row("backend", f"{model.backend}, {len(model.labels)} concepts")
+    table.add_row("reference frames", "\n".join(model.notes["reference_frames"]))
+    table.add_row("diameter seen", f"{model.diameter_m * 1000:.0f} mm")
+    table.add_row("surface points", str(quality["points"]))
+    table.add_row("viewing sphere", f"{quality['coverage']:.0%} within 60 degrees of a reference view")
+    table.add_row("seen twice", f"{quality['shared']:.0%} of the points, agreeing to {quality['agreement']:.2f}")
+    table.add_row("missing", "\n".join(quality["problems"]) or "nothing")
+    return table
 
 
 def main() -> None:

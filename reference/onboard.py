@@ -67,6 +67,7 @@ def onboard(
         backend=backend.name,
         fingerprint=backend.fingerprint,
         notes={"reference_frames": [frame.frame.provenance.source for frame in frames]},
+        references=tuple(frames),
         **{name: getattr(fused, name) for name in fused.__slots__},
     )
     quality = judge(model)

@@ -26,14 +26,14 @@ FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("
 # Each imports only from those before it. A new module needs a place here.
 ORDER = {
     "tracker": (
-        "errors", "geometry", "frame", "sources", "view", "saliency", "cloud", "concept", "matching",
-        "appearance", "projection", "least_squares", "closest_points", "umeyama", "hypotheses", "registration",
-        "verification", "refinement", "pose_filter", "config", "result", "stopwatch", "pipeline", "output",
-        "viewer", "terminal", "__main__",
+        "errors", "geometry", "frame", "sources", "view", "saliency", "cloud", "region", "reference_views",
+        "grounding", "concept", "matching", "appearance", "projection", "least_squares", "closest_points",
+        "umeyama", "hypotheses", "registration", "verification", "refinement", "pose_filter", "config",
+        "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
-        "quality", "onboard", "__main__",
+        "quality", "onboard", "plate", "__main__",
     ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}

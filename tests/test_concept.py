@@ -42,7 +42,7 @@ def same(a: ConceptModel, b: ConceptModel) -> bool:
         np.array_equal(getattr(a, name), getattr(b, name)) and getattr(a, name).dtype == getattr(b, name).dtype
         for name in ARRAYS
     )
-    others = [name for name in ConceptModel.__slots__ if name not in ARRAYS]
+    others = [name for name in ConceptModel.__slots__ if name not in (*ARRAYS, "references")]
     return arrays and all(getattr(a, name) == getattr(b, name) for name in others)
 
 

@@ -25,6 +25,12 @@ class Track:
     """Concept model that python -m reference made; once for every object."""
     out: Path | None = None
     """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view makes."""
+    weights: str | None = None
+    """Weights of the backend that made the models: a size, a name on the hub, or a folder."""
+    device: str = "auto"
+    """Where the backend runs; auto is CUDA where there is one."""
+    locate: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CONCEPT"), tyro.conf.UseAppendAction] = ()
+    """Say in every line where this concept of the object is; once for every concept."""
     masks: Literal["given"] = "given"
     """Where the object's pixels come from: given by the source."""
     prior: Literal["on", "off"] | None = None
@@ -46,6 +52,7 @@ class Track:
         from tracker.errors import ConfigError, TrackerError
         from tracker.output import as_json_line, result_folder
         from tracker.pipeline import ObjectTracker
+        from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import open_source
         from tracker.viewer import NullViewer, OverlayVideo
 
@@ -55,7 +62,9 @@ class Track:
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
         models = [ConceptModel.load(path) for path in self.model]
-        tracker = ObjectTracker(models, config)
+        backend = open_backend(models[0].backend, BackendOptions(self.weights, self.device))
+        tracker = ObjectTracker(models, config, backend)
+        regions = {model.object_id: {c: model.locate(c, backend) for c in self.locate} for model in models}
         source = open_source(self.source)
         summary = _Summary()
         failure: TrackerError | None = None
@@ -73,7 +82,8 @@ class Track:
                     viewer.show(frame, results, {})
                     for result in results:
                         summary.add(result.object_id, result.state.value, result.timings_ms["total"])
-                        line = as_json_line(result, frame.index)
+                        seen = {c: r and result.locate(r) for c, r in regions[result.object_id].items()}
+                        line = as_json_line(result, frame.index, seen)
                         if lines:
                             lines.write(line + "\n")
                         if self.json:

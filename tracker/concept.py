@@ -17,11 +17,15 @@ import safetensors
 import safetensors.numpy
 
 from tracker.errors import ModelError, OutputError
+from tracker.frame import PosedFrame
 from tracker.geometry import Floats
-from tracker.saliency import SaliencyBackend
+from tracker.grounding import ground
+from tracker.reference_views import PARTS, packed, unpacked
+from tracker.region import Region, region_of
+from tracker.saliency import SaliencyBackend, open_backend
 from tracker.view import Float32s
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 FORMAT = "conceptrack concept model"
 ARRAYS = ("points", "normals", "colours", "saliency", "view_count", "agreement", "view_directions")
 
@@ -37,6 +41,7 @@ class ConceptModel:
     diameter_m: greatest distance between two points seen; the scale at which saliency was measured.
     labels: the L concepts. backend, fingerprint: who measured them and with which settings.
     notes: how it came about (reference frames, quality), JSON-ready.
+    references: the K reference views, empty outside the object's box, so that other concepts can be asked for later.
     """
 
     object_id: str
@@ -52,9 +57,30 @@ class ConceptModel:
     backend: str
     fingerprint: str
     notes: dict[str, Any] = field(default_factory=dict)
+    references: tuple[PosedFrame, ...] = ()
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def locate(self, label: str, backend: SaliencyBackend | None = None) -> Region | None:
+        """Where on the object a concept is, in object coordinates; None where it is not to be seen on it.
+
+        A label outside the model's vocabulary is looked for in the reference views, by the backend that made the model
+        (None opens it by name). Raises ModelError where there are no views, ConfigError where the backend knows no
+        such concept.
+        """
+        if label in self.labels:
+            saliency = self.saliency[:, self.labels.index(label)].astype(np.float64)
+        elif self.references:
+            backend = backend or open_backend(self.backend)
+            self.require_backend(backend)
+            saliency = ground(label, self.references, backend, self.points, self.diameter_m)
+        else:
+            raise ModelError(
+                f"the model of {self.object_id!r} does not hold {label!r} and has no reference views to look for it; "
+                f"it holds {', '.join(self.labels)}"
+            )
+        return region_of(label, self.points, saliency, self.diameter_m)
 
     def require_backend(self, backend: SaliencyBackend) -> None:
         """Raises ModelError unless this backend measured the model, with the settings that it has now.
@@ -70,6 +96,7 @@ class ConceptModel:
     def save(self, path: str | Path) -> None:
         """Write the file whole or not at all. Raises OutputError where it cannot be written."""
         path = Path(path)
+        views, view_headers = packed(self.references)
         header = {
             "format": FORMAT,
             "version": FORMAT_VERSION,
@@ -79,8 +106,9 @@ class ConceptModel:
             "backend": self.backend,
             "fingerprint": self.fingerprint,
             "notes": self.notes,
+            "references": view_headers,
         }
-        arrays = {name: np.ascontiguousarray(getattr(self, name)) for name in ARRAYS}
+        arrays = {name: np.ascontiguousarray(getattr(self, name)) for name in ARRAYS} | views
         content = safetensors.numpy.save(arrays, metadata={"concept_model": json.dumps(header)})
         partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
         try:
@@ -103,6 +131,8 @@ class ConceptModel:
                 header = json.loads((file.metadata() or {}).get("concept_model", "{}"))
                 _check_header(path, header)
                 arrays = {name: file.get_tensor(name) for name in ARRAYS}
+                names = (f"view{k}.{part}" for k in range(len(header["references"])) for part in PARTS)
+                views = unpacked({n: file.get_tensor(n) for n in names}, header["references"], header["object_id"])
         except (safetensors.SafetensorError, ValueError, OSError) as error:
             raise ModelError(f"{path}: not a whole concept model ({error})") from error
         _check_arrays(path, arrays, len(header["labels"]))
@@ -113,6 +143,7 @@ class ConceptModel:
             backend=header["backend"],
             fingerprint=header["fingerprint"],
             notes=header["notes"],
+            references=views,
             **arrays,
         )
 
@@ -132,6 +163,7 @@ def _check_header(path: Path, header: dict[str, Any]) -> None:
         "backend": str,
         "fingerprint": str,
         "notes": dict,
+        "references": list,
     }
     for key, kind in expected.items():
         if not isinstance(header.get(key), kind):

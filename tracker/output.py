@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from tracker.errors import OutputError
 from tracker.geometry import Pose
+from tracker.region import SeenRegion
 from tracker.result import TrackResult
 
 
@@ -56,8 +57,11 @@ def require_free(path: Path, overwrite: bool) -> None:
         raise OutputError(f"{path} holds results already; give another folder, or --overwrite")
 
 
-def as_json_line(result: TrackResult, frame_index: int) -> str:
-    """One result as a line of JSON: metres, radians, nanoseconds, quaternions wxyz; null where there is no pose."""
+def as_json_line(result: TrackResult, frame_index: int, regions: Mapping[str, SeenRegion | None] | None = None) -> str:
+    """One result as a line of JSON: metres, radians, nanoseconds, quaternions wxyz; null where there is no pose.
+
+    regions: where concepts of the object are; null where a concept is not on it.
+    """
     evidence = result.evidence
     return json.dumps(
         {
@@ -72,8 +76,22 @@ def as_json_line(result: TrackResult, frame_index: int) -> str:
             "covariance": None if result.covariance is None else result.covariance.tolist(),
             "evidence": None if evidence is None else {k: round(getattr(evidence, k), 4) for k in evidence.__slots__},
             "timings_ms": {stage: round(ms, 2) for stage, ms in result.timings_ms.items()},
+            **({"regions": {concept: _region(seen) for concept, seen in regions.items()}} if regions else {}),
         }
     )
+
+
+def _region(seen: SeenRegion | None) -> dict[str, Any] | None:
+    if seen is None:
+        return None
+    return {
+        "centre_cam_m": seen.cam.centre_m.round(5).tolist(),
+        "centre_obj_m": seen.obj.centre_m.round(5).tolist(),
+        "axes_cam": seen.cam.axes.round(5).tolist(),
+        "extent_m": seen.obj.extent_m.round(5).tolist(),
+        "visible": round(seen.visible, 3),
+        "share": round(seen.obj.share, 3),
+    }
 
 
 def _pose(pose: Pose | None) -> dict[str, Any] | None:

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 
 from tracker.appearance import ViewAppearance, view_appearance
@@ -20,7 +21,7 @@ from tracker.matching import Correspondences, Matcher
 from tracker.pose_filter import PoseFilter
 from tracker.refinement import Refined, Refiner
 from tracker.registration import register
-from tracker.result import TrackResult, TrackState
+from tracker.result import Surface, TrackResult, TrackState
 from tracker.saliency import Query, Saliency, SaliencyBackend, open_backend
 from tracker.stopwatch import Stopwatch
 from tracker.verification import Evidence, Verifier
@@ -154,7 +155,7 @@ class _Track:
             return self._lost(frame, f"poor fit: the best pose explains {score:.2f} of what should be seen", clock)
 
         # 4. What does that say about its pose, given where it has been?
-        return self._tracked(frame, found, clock)
+        return self._tracked(frame, found, view, clock)
 
     def _expected(
         self, frame: Frame, sight: _Sight, correspondences: Correspondences, clock: Stopwatch
@@ -200,7 +201,7 @@ class _Track:
         with clock("verification"):
             return _Hypothesis(refined, self._verify(refined.T_cam_obj, sight.view, sight.appearance), origin)
 
-    def _tracked(self, frame: Frame, found: _Hypothesis, clock: Stopwatch) -> TrackResult:
+    def _tracked(self, frame: Frame, found: _Hypothesis, view: ObjectView, clock: Stopwatch) -> TrackResult:
         raw, information = found.refined.T_cam_obj, found.refined.information
         with clock("filter"):
             filtered = self._filter.update(raw, information, frame.stamp_ns) if self._config.prior else None
@@ -218,6 +219,7 @@ class _Track:
             raw_pose=raw,
             evidence=found.evidence,
             timings_ms=clock.timings_ms(),
+            surface=Surface(self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera),
         )
 
     def _lost(self, frame: Frame, reason: str, clock: Stopwatch) -> TrackResult:

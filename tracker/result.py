@@ -5,8 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from tracker.geometry import Floats, Pose
+import numpy as np
+
+from tracker.concept import ConceptModel
+from tracker.geometry import Floats, Intrinsics, Pose
+from tracker.projection import nearest_pixels, project
+from tracker.region import Region, SeenRegion
 from tracker.verification import Evidence
+from tracker.view import Float32s
+
+SAME_SURFACE = 0.05  # of the diameter: a point whose pixel is measured this near is the one that is seen
 
 
 class TrackState(Enum):
@@ -18,12 +26,30 @@ class TrackState(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """What a frame measured of an object: its own pixels' depth (h, w), metres, 0 elsewhere, and their camera."""
+
+    model: ConceptModel
+    depth_m: Float32s
+    camera: Intrinsics
+
+    def share_seen(self, points_cam: Floats, weights: Floats) -> float:
+        """Share of points (N, 3), by weight (N,), that lie on the measured surface."""
+        at = project(points_cam, np.zeros_like(points_cam), Pose.identity(), self.camera)
+        rows, columns = nearest_pixels(at, self.camera)
+        off_m = np.abs(self.depth_m[rows, columns] - points_cam[:, 2])
+        on = at.within(self.camera, 0) & (self.depth_m[rows, columns] > 0)
+        return float(weights[on & (off_m < SAME_SURFACE * self.model.diameter_m)].sum() / weights.sum())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class TrackResult:
     """stamp_ns, object_id: of which frame and object. pose: T_cam_obj after the filter, None unless TRACKING.
     state: see TrackState. confidence: in [0, 1], the share of the model's surface that should be seen and is, in place
     and in colour; 0 without a pose. covariance: (6, 6) of `pose`, of (turn, radians; shift, metres) in camera axes
     about the object's origin. reason: why there is no pose, or how it came about. raw_pose: T_cam_obj of this frame
-    alone, before the filter. evidence: what the confidence was judged by. timings_ms: stage -> milliseconds."""
+    alone, before the filter. evidence: what the confidence was judged by. timings_ms: stage -> milliseconds.
+    surface: what was seen of the object, None without a pose."""
 
     stamp_ns: int
     object_id: str
@@ -35,3 +61,18 @@ class TrackResult:
     raw_pose: Pose | None
     evidence: Evidence | None
     timings_ms: dict[str, float]
+    surface: Surface | None = None
+
+    def locate(self, concept: str | Region) -> SeenRegion | None:
+        """Where a concept of the object is in this frame. None without a pose, or where the object does not have it.
+
+        concept: a label, or what `ConceptModel.locate` said of one, which spares asking the model in every frame.
+        Raises as `ConceptModel.locate` does.
+        """
+        if self.pose is None or self.surface is None:
+            return None
+        region = self.surface.model.locate(concept) if isinstance(concept, str) else concept
+        if region is None:
+            return None
+        in_cam = region.moved(self.pose)
+        return SeenRegion(region, in_cam, self.surface.share_seen(in_cam.points, region.weights))

@@ -17,8 +17,7 @@ from tracker.view import ObjectView
 class VerificationConfig(BaseModel):
     """model_points: how many are looked at. depth_sigma: distance at which a surface still agrees, as a share of the
     diameter, at least depth_sigma_least_m. lab_sigma: colour difference at which it still agrees. colour_share: share
-    of the score that colour decides; geometry decides the rest. unexplained_weight: how much a pixel of the object that
-    the model does not account for counts, against one that it gets wrong: the model may not know that side."""
+    of the score that colour decides; geometry decides the rest."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -27,13 +26,12 @@ class VerificationConfig(BaseModel):
     depth_sigma_least_m: float = Field(default=0.003, gt=0)
     lab_sigma: float = Field(default=14.0, gt=0)
     colour_share: float = Field(default=0.7, ge=0, le=1)
-    unexplained_weight: float = Field(default=0.5, ge=0, le=1)
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour, lowered by the
-    share of the object that the pose leaves unexplained.
+    """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour, times
+    `explained`: a pose that shows a side of which the model knows nothing has proved nothing.
     surface: the same in place alone. colour: agreement of the colours where the place agrees.
     seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
     outside the mask. hidden: share of the camera-facing model that something in front hides. explained: share of the
@@ -85,9 +83,8 @@ class Verifier:
         colour_share = self._config.colour_share
         agreed = float((surface * (1 - colour_share + colour_share * colour)).sum() / total)
         explained = _explained(rows[in_place], columns[in_place], view)
-        unexplained = self._config.unexplained_weight * (1 - explained)
         return Evidence(
-            score=agreed * explained / max(explained + unexplained, 1e-9),
+            score=agreed * explained,
             surface=float(surface.sum() / total),
             colour=float((surface * colour).sum() / max(surface.sum(), 1e-9)),
             seen_through=float((weights * (on_object & (behind_m > reach_m))).sum() / total),

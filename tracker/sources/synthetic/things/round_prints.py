@@ -17,6 +17,7 @@ MUG_WRAP_MM: Final = (264.0, 88.0)
 
 RED, CREAM, GOLD, GREEN = (178, 34, 34), (248, 240, 214), (206, 166, 70), (46, 110, 52)
 NAVY, CORAL, SAND, SKY, GLAZE = (36, 52, 92), (232, 98, 78), (240, 200, 132), (150, 196, 208), (240, 238, 230)
+VIOLET = (152, 72, 190)
 
 
 def _tomato(sheet: Sheet, x_mm: float, y_mm: float, radius_mm: float) -> None:

@@ -36,7 +36,8 @@ def soup_can() -> Thing:
 
 def mug() -> Thing:
     glaze, coral = plain(round_prints.GLAZE, 0.6), plain(round_prints.CORAL, 0.6)
-    texture, w = pack({"wrap": glossy(round_prints.mug_wrap(), 0.6), "glaze": glaze, "coral": coral})
+    violet = plain(round_prints.VIOLET, 0.6)  # nothing else on the mug is of the handle's colour
+    texture, w = pack({"wrap": glossy(round_prints.mug_wrap(), 0.6), "glaze": glaze, "coral": coral, "violet": violet})
     cup = revolved(
         [
             Strip([(0, -0.041), (0.034, -0.041), (0.037, -0.038), (0.0378, 0.044)], w["coral"]),
@@ -48,7 +49,7 @@ def mug() -> Thing:
     )
     path = curve([(0.0405, 0.029), (0.054, 0.031), (0.068, 0.022), (0.072, 0.001), (0.065, -0.020), (0.0400, -0.030)])
     ends = 1 + 0.35 * np.linspace(-1, 1, len(path)) ** 8  # the handle widens where it meets the wall
-    handle = swept(path, 0.0042 * ends, 0.0068 * ends).in_window(*w["coral"])
+    handle = swept(path, 0.0042 * ends, 0.0068 * ends).in_window(*w["violet"])
     return Thing("mug", joined([cup, handle], separate=True).centred(), texture)
 
 
