@@ -42,9 +42,7 @@ def packed(views: Sequence[PosedFrame]) -> tuple[dict[str, npt.NDArray], list[di
     return arrays, headers
 
 
-def unpacked(
-    arrays: Mapping[str, npt.NDArray], headers: Sequence[Any], object_id: str
-) -> tuple[PosedFrame, ...]:  # fmt: skip
+def unpacked(arrays: Mapping[str, npt.NDArray], headers: Sequence[Any], object_id: str) -> tuple[PosedFrame, ...]:
     """The frames again, empty outside the box. Raises ValueError where arrays and headers do not fit together."""
     return tuple(
         _unpacked([arrays[f"view{k}.{part}"] for part in PARTS], header, object_id) for k, header in enumerate(headers)
@@ -66,5 +64,5 @@ def _unpacked(parts: list[npt.NDArray], header: Any, object_id: str) -> PosedFra
         provenance = Provenance(str(header["source"]), raw_depth_unit_m=header["depth_unit_m"])
         frame = Frame(rgb, depth_m, camera, 0, {object_id: mask}, int(header["index"]), provenance)
         return PosedFrame(frame, object_id, Pose.from_matrix(header["T_cam_obj"]), mask)
-    except (KeyError, TypeError, IndexError, AttributeError, TrackerError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, TrackerError) as error:
         raise ValueError(f"a reference view is damaged: {error}") from error
