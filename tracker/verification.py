@@ -31,7 +31,8 @@ class VerificationConfig(BaseModel):
 @dataclass(frozen=True, slots=True)
 class Evidence:
     """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour, times
-    `explained`: a pose that shows a side of which the model knows nothing has proved nothing.
+    e^2 / (e^2 + (1 - e)^2) with e = `explained`: a model need not know all that is seen, but a pose under which it knows
+    next to nothing has proved nothing.
     surface: the same in place alone. colour: agreement of the colours where the place agrees.
     seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
     outside the mask. hidden: share of the camera-facing model that something in front hides. explained: share of the
@@ -84,7 +85,7 @@ class Verifier:
         agreed = float((surface * (1 - colour_share + colour_share * colour)).sum() / total)
         explained = _explained(rows[in_place], columns[in_place], view)
         return Evidence(
-            score=agreed * explained,
+            score=agreed * explained**2 / (explained**2 + (1 - explained) ** 2),
             surface=float(surface.sum() / total),
             colour=float((surface * colour).sum() / max(surface.sum(), 1e-9)),
             seen_through=float((weights * (on_object & (behind_m > reach_m))).sum() / total),
