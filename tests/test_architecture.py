@@ -27,9 +27,9 @@ FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("
 ORDER = {
     "tracker": (
         "errors", "geometry", "frame", "sources", "view", "saliency", "cloud", "region", "reference_views",
-        "grounding", "concept", "matching", "appearance", "projection", "least_squares", "closest_points",
-        "umeyama", "hypotheses", "registration", "verification", "refinement", "pose_filter", "config",
-        "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
+        "grounding", "concept", "measures", "matching", "appearance", "projection", "least_squares",
+        "closest_points", "umeyama", "hypotheses", "registration", "verification", "refinement", "pose_filter",
+        "config", "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",

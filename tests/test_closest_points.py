@@ -42,7 +42,7 @@ def cloud_of(points_obj: Floats, normals_obj: Floats, T_cam_obj: Pose = T_CAM_OB
 
 
 def all_right(count: int) -> Correspondences:
-    return Correspondences(np.arange(count), np.arange(count), np.zeros(count, np.float32))
+    return Correspondences(np.arange(count), np.arange(count), *np.zeros((2, count), np.float32))
 
 
 def off(seed: int, angle_deg: float, distance_m: float) -> Pose:
@@ -137,7 +137,7 @@ def test_concepts_pull_from_afar_though_many_of_them_are_wrong(seed: int, wrong:
     surface = ellipsoid(0, 1500)
     rng = np.random.default_rng([seed, 6])
     index = np.where(rng.random(1500) < wrong, rng.integers(1500, size=1500), np.arange(1500))
-    pairs = Correspondences(np.arange(1500), index, np.zeros(1500, np.float32))
+    pairs = Correspondences(np.arange(1500), index, *np.zeros((2, 1500), np.float32))
     found = ClosestPoints(model_of(*surface), CONFIG).pull(off(seed, 15, 0.02), pairs, cloud_of(*surface))
     millimetres, degrees = errors(found)
     assert millimetres < 3
@@ -166,7 +166,7 @@ def test_the_pull_is_equivariant_under_motions_of_the_camera() -> None:
     surface = ellipsoid(0, 800)
     index = np.random.default_rng(0).permutation(800)
     index[::2] = np.arange(0, 800, 2)
-    pairs = Correspondences(np.arange(800), index, np.zeros(800, np.float32))
+    pairs = Correspondences(np.arange(800), index, *np.zeros((2, 800), np.float32))
     closest, start, motion = ClosestPoints(model_of(*surface), CONFIG), off(1, 15, 0.02), Pose.exp((1, 2, -1, 3, 0, 1))
     found = closest.pull(start, pairs, cloud_of(*surface))
     moved = closest.pull(motion @ start, pairs, cloud_of(*surface, motion @ T_CAM_OBJ))

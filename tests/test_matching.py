@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -171,3 +173,60 @@ def test_of_a_rendered_view_many_matches_are_right_and_far_more_than_by_chance(
     by_chance_m = np.linalg.norm(points_obj - can_model.points[chance], axis=1)
     assert (errors_m < 0.01).mean() > 0.2
     assert (errors_m < 0.01).mean() > 5 * (by_chance_m < 0.01).mean()
+
+
+def test_only_what_is_best_in_both_directions_is_mutual() -> None:
+    query, of_model = maps(12, 300), maps(13, 200)
+    for memory_mb in (1, 64):  # whatever the blocks
+        found = match(query, of_model, MatchingConfig(mutual=True, memory_mb=memory_mb))
+        expected = divergences(query, of_model, MatchingConfig().temperature)
+        both = [q for q in range(300) if expected[:, expected[q].argmin()].argmin() == q]
+        assert found.query_index.tolist() == both
+        assert 0 < len(both) < 200
+
+
+def test_a_point_may_have_several_matches_the_best_first() -> None:
+    query, of_model = maps(14, 60), maps(15, 90)
+    found = match(query, of_model, MatchingConfig(per_point=3))
+    expected = divergences(query, of_model, MatchingConfig().temperature).argsort(axis=1)[:, :3]
+    assert np.array_equal(found.model_index.reshape(60, 3), expected)
+    assert np.array_equal(found.query_index, np.repeat(np.arange(60), 3))
+
+
+def test_when_there_are_too_many_those_of_the_greatest_margin_are_kept() -> None:
+    query, of_model = maps(16, 200), maps(17, 150)
+    every = match(query, of_model)
+    few = match(query, of_model, MatchingConfig(kept=40))
+    assert len(few) == 40
+    assert few.margin.min() >= np.sort(every.margin)[-40]
+    assert (np.diff(few.query_index) > 0).all()
+
+
+def test_the_margin_is_less_where_the_object_has_a_look_alike_elsewhere() -> None:
+    """Ten points of the model have a twin on the other side, ten are like no other; twins nearby do not count."""
+    base = 3 * np.eye(20, 21, dtype=np.float32)
+    model = model_with(np.concatenate((base, base[:10], base)))
+    place = np.random.default_rng(0).uniform(-0.05, 0.05, (20, 3))
+    model = replace(model, points=np.concatenate((place, place[:10] + np.array((1, 0, 0)), place + 1e-3)))
+    found = Matcher(model, MatchingConfig(), CPU)(cloud_with(base))
+    assert found.margin[:10] == pytest.approx(0, abs=1e-4)
+    assert found.margin[10:].min() > 1
+
+
+def test_matching_ten_thousand_points_to_ten_thousand_holds_little_memory() -> None:
+    """The whole similarity matrix would take 400 MB."""
+    before = torch.from_numpy(maps(18, 10_000, 40))
+    matcher = Matcher(model_with(before.numpy()), MatchingConfig(query_points=10_000), CPU)
+    largest: list[int] = []
+    multiply = torch.Tensor.__matmul__
+
+    def weighed(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+        product = multiply(a, b)
+        largest.append(product.numel() * product.element_size())
+        return product
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(torch.Tensor, "__matmul__", weighed)
+        found = matcher(cloud_with(before.numpy()))
+    assert max(largest) <= 64 * 2**20
+    assert np.array_equal(found.model_index, np.arange(10_000))

@@ -113,7 +113,7 @@ def as_problem(
     nothing = np.zeros((len(points_cam), 3), np.float32)
     cloud = PointCloud(points_cam, normals_cam, nothing, nothing[:, :1])
     every = np.arange(len(points_cam))
-    return Correspondences(every, model_index, np.zeros(len(every), np.float32)), cloud, model
+    return Correspondences(every, model_index, *np.zeros((2, len(every)), np.float32)), cloud, model
 
 
 def problem(seed: int, right: float, count: int = 400, T_cam_obj: Pose = T_CAM_OBJ, noise_m: float = 0.001) -> Problem:
@@ -163,7 +163,7 @@ def test_a_motion_of_the_cloud_moves_the_pose_alike(seed: int, motion: Pose) -> 
 def test_the_order_of_the_correspondences_does_not_matter_but_for_the_sampling(seed: int) -> None:
     pairs, cloud, model = problem(seed, right=0.3)
     order = np.random.default_rng(seed).permutation(len(pairs))
-    shuffled = Correspondences(pairs.query_index[order], pairs.model_index[order], pairs.divergence[order])
+    shuffled = pairs[order]
     a, b = (candidates((p, cloud, model), QUICK)[0] for p in (pairs, shuffled))
     assert apart(a.T_cam_obj, b.T_cam_obj) < 5e-3
     assert a.inlier_share == pytest.approx(b.inlier_share, abs=0.01)

@@ -11,32 +11,50 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
+from tracker.measures import Encoded, Measure, encode_model, encode_query
 from tracker.view import Float32s
+
+FAR = 0.1  # of the diameter: model points farther apart than this are different places
+DISTINCT_POINTS = 2000  # of the model, among which a place's look-alikes are sought
 
 
 class MatchingConfig(BaseModel):
-    """temperature: tau of the softmax that makes saliency a distribution over concepts.
-    query_points: at most so many points of the cloud are matched, spread evenly over it.
+    """measure: of how unlike two concept vectors are. temperature: tau of the softmax that makes saliency a
+    distribution over concepts. query_points: at most so many points of the cloud are matched, spread evenly over it
+    (the paper's cap). per_point: how many points of the model each is matched to. mutual: keep only matches that are
+    the best in both directions. kept: at most so many matches, those of the greatest margin.
     memory_mb: bound on the block of the similarity matrix that is held at a time."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    measure: Measure = "forward"
     temperature: float = Field(default=0.3, gt=0)
     query_points: int = Field(default=1500, ge=50, le=10_000)
+    per_point: int = Field(default=1, ge=1, le=32)
+    mutual: bool = False
+    kept: int = Field(default=10_000, ge=3)
     memory_mb: float = Field(default=64.0, ge=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correspondences:
     """query_index, model_index: (M,) points of the cloud and of the model that say the same.
-    divergence: (M,) float32, KL(query || model) of their concept vectors in nats."""
+    divergence: (M,) float32 of their concept vectors, in nats (one minus the cosine, where that is the measure).
+    margin: (M,) float32, by how much less they diverge than the model's point does from its nearest look-alike
+    elsewhere on the object: below zero where the match might as well be there."""
 
     query_index: npt.NDArray[np.intp]
     model_index: npt.NDArray[np.intp]
     divergence: Float32s
+    margin: Float32s
 
     def __len__(self) -> int:
         return len(self.query_index)
+
+    def __getitem__(self, chosen: npt.NDArray) -> Correspondences:
+        return Correspondences(
+            self.query_index[chosen], self.model_index[chosen], self.divergence[chosen], self.margin[chosen]
+        )
 
 
 def concept_vectors(saliency: torch.Tensor, temperature: float) -> torch.Tensor:
@@ -45,24 +63,63 @@ def concept_vectors(saliency: torch.Tensor, temperature: float) -> torch.Tensor:
 
 
 class Matcher:
-    """For each point of a cloud the model's point of least forward KL divergence, the paper's Eq. 3."""
+    """For each point of a cloud the model's points of least divergence, the paper's Eq. 3."""
 
     def __init__(self, model: ConceptModel, config: MatchingConfig, device: torch.device) -> None:
         self._config, self._device = config, device
-        saliency = torch.from_numpy(model.saliency).to(device)
-        self._log_model = concept_vectors(saliency, config.temperature).T.contiguous()
+        log_model = concept_vectors(torch.from_numpy(model.saliency).to(device), config.temperature)
+        self._model = encode_model(log_model, config.measure).T.contiguous()
+        self._distinctness = self._look_alikes(model, log_model)
 
     def __call__(self, cloud: PointCloud) -> Correspondences:
-        chosen = np.linspace(0, len(cloud) - 1, min(len(cloud), self._config.query_points)).round().astype(np.intp)
+        config = self._config
+        chosen = np.linspace(0, len(cloud) - 1, min(len(cloud), config.query_points)).round().astype(np.intp)
         saliency = torch.from_numpy(cloud.saliency[chosen]).to(self._device)
-        log_query = concept_vectors(saliency, self._config.temperature)
-        query = log_query.exp()
-        rows = max(1, int(self._config.memory_mb * 2**20 / 4 / self._log_model.shape[1]))
-        cross = [(block @ self._log_model).max(dim=1) for block in query.split(rows)]
-        # KL(q || m) = sum q log q - sum q log m: the first term is the same for every m
-        divergence = (query * log_query).sum(dim=1) - torch.cat([c.values for c in cross])
-        return Correspondences(
-            query_index=chosen,
-            model_index=torch.cat([c.indices for c in cross]).cpu().numpy(),
-            divergence=divergence.clamp_min(0).cpu().numpy(),
+        query = encode_query(concept_vectors(saliency, config.temperature), config.measure)
+        per_point = min(config.per_point, self._model.shape[1])
+        likeness, nearest, backward = self._greatest(query, per_point)
+        divergence = (query.own.unsqueeze(1) - likeness).clamp_min(0)
+        margin = self._distinctness[nearest] - divergence
+        found = Correspondences(
+            query_index=np.repeat(chosen, per_point),
+            model_index=nearest.flatten().cpu().numpy(),
+            divergence=divergence.flatten().cpu().numpy(),
+            margin=margin.flatten().cpu().numpy(),
         )
+        if config.mutual:
+            own = torch.arange(len(chosen), device=self._device).unsqueeze(1)
+            found = found[(backward[nearest] == own).flatten().cpu().numpy()]
+        if len(found) > config.kept:
+            found = found[np.sort(np.argsort(-found.margin, kind="stable")[: config.kept])]
+        return found
+
+    def _greatest(self, queries: torch.Tensor, per_point: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """(N, k) greatest likenesses of every query and their model points, block by block; and (M,) every model
+        point's best query, if matches are to be mutual."""
+        model_points = self._model.shape[1]
+        rows = max(1, int(self._config.memory_mb * 2**20 / 4 / model_points))
+        best = torch.full((model_points,), -torch.inf, device=self._device)
+        backward = torch.zeros(model_points, dtype=torch.long, device=self._device)
+        found = []
+        for start in range(0, len(query.own), rows):
+            block = query.features[start : start + rows] @ self._model
+            found.append(block.max(dim=1, keepdim=True) if per_point == 1 else block.topk(per_point, dim=1))
+            if self._config.mutual:
+                column = (block - query.own[start : start + rows].unsqueeze(1)).max(dim=0)
+                backward = torch.where(column.values > best, column.indices + start, backward)
+                best = torch.maximum(best, column.values)
+        return torch.cat([f.values for f in found]), torch.cat([f.indices for f in found]), backward
+
+    def _look_alikes(self, model: ConceptModel, log_model: torch.Tensor) -> torch.Tensor:
+        """(M,) divergence of every model point from the most similar one elsewhere on the object."""
+        some = torch.linspace(0, len(model) - 1, min(len(model), DISTINCT_POINTS), device=self._device).long()
+        points = torch.from_numpy(model.points).float().to(self._device)
+        query = encode_query(log_model, self._config.measure)
+        rows = max(1, int(self._config.memory_mb * 2**20 / 8 / len(some)))
+        likeness = [
+            (part @ self._model[:, some])
+            .masked_fill_(torch.cdist(place, points[some]) < FAR * model.diameter_m, -torch.inf)
+            .amax(dim=1)
+            for part, place in zip(query.features.split(rows), points.split(rows), strict=True)
+        ]
+        return (query.own - torch.cat(likeness)).clamp(0, 10)  # no look-alike at all: as distinct as can be

@@ -31,8 +31,8 @@ class VerificationConfig(BaseModel):
 @dataclass(frozen=True, slots=True)
 class Evidence:
     """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour, times
-    e^2 / (e^2 + (1 - e)^2) with e = `explained`: a model need not know all that is seen, but a pose under which it knows
-    next to nothing has proved nothing.
+    e^2 / (e^2 + (1 - e)^2) with e = `explained`: a model need not know all that is seen, but where it knows
+    next to nothing it has proved nothing.
     surface: the same in place alone. colour: agreement of the colours where the place agrees.
     seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
     outside the mask. hidden: share of the camera-facing model that something in front hides. explained: share of the
