@@ -93,7 +93,7 @@ class Matcher:
             found = found[np.sort(np.argsort(-found.margin, kind="stable")[: config.kept])]
         return found
 
-    def _greatest(self, queries: torch.Tensor, per_point: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    def _greatest(self, query: Encoded, per_point: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """(N, k) greatest likenesses of every query and their model points, block by block; and (M,) every model
         point's best query, if matches are to be mutual."""
         model_points = self._model.shape[1]
