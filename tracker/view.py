@@ -23,11 +23,13 @@ MARGIN_PX = 4  # empty pixels around the view, so that smoothing and lookups nee
 
 
 class ViewConfig(BaseModel):
-    """pixels_across: view pixels that span the object's diameter at its median depth (the paper's 64 voxels)."""
+    """pixels_across: view pixels that span the object's diameter at its median depth (the paper's 64 voxels).
+    least_pixels: of the object; where so much of it is hidden that there would be fewer, pixels are made smaller."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     pixels_across: int = Field(default=64, ge=8, le=512)
+    least_pixels: int = Field(default=600, ge=0)
 
 
 class Box(NamedTuple):
@@ -89,6 +91,7 @@ def view_object(frame: Frame, mask: Mask, extent_m: float, config: ViewConfig) -
         return None
     distance_m = float(np.median(depth_m[measured]))
     block = max(1, round(extent_m / config.pixels_across * frame.intrinsics.fx / distance_m))
+    block = min(block, max(1, int((np.count_nonzero(inside) / max(config.least_pixels, 1)) ** 0.5)))
     rgb, share = _pool_colour(frame.rgb[box.y0 : box.y1, box.x0 : box.x1], inside, block)
     pooled_m = _pool_depth(depth_m, measured, block, tolerance_m=extent_m / config.pixels_across)
     height, width = share.shape
