@@ -16,6 +16,7 @@ from tracker.matching import MatchingConfig
 from tracker.pose_filter import FilterConfig
 from tracker.refinement import RefinementConfig
 from tracker.registration import RegistrationConfig
+from tracker.saliency.device import torch_device
 from tracker.verification import VerificationConfig
 from tracker.view import ViewConfig
 
@@ -46,12 +47,7 @@ class TrackerConfig(BaseModel):
     @property
     def torch_device(self) -> torch.device:
         """Raises ConfigError where the device does not exist here."""
-        name = ("cuda" if torch.cuda.is_available() else "cpu") if self.device == "auto" else self.device
-        try:
-            torch.empty(0, device=name)
-        except (RuntimeError, AssertionError) as error:
-            raise ConfigError(f"device {name!r} cannot be used here: {str(error).splitlines()[0]}") from error
-        return torch.device(name)
+        return torch_device(self.device)
 
 
 def read_config(path: str | Path | None) -> TrackerConfig:

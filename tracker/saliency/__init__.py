@@ -122,11 +122,58 @@ def _attributes(options: BackendOptions) -> SaliencyBackend:
     return Attributes()
 
 
-BACKENDS: dict[str, Callable[[BackendOptions], SaliencyBackend]] = {"attributes": _attributes}
+def _siglip2(options: BackendOptions) -> SaliencyBackend:
+    from tracker.saliency.siglip2 import open_siglip2
+
+    return open_siglip2(options)
+
+
+def _clip(options: BackendOptions) -> SaliencyBackend:
+    from tracker.saliency.clip import open_clip
+
+    return open_clip(options)
+
+
+def _dinotxt(options: BackendOptions) -> SaliencyBackend:
+    from tracker.saliency.dinotxt import open_dinotxt
+
+    return open_dinotxt(options)
+
+
+BACKENDS: dict[str, Callable[[BackendOptions], SaliencyBackend]] = {
+    "attributes": _attributes,
+    "siglip2": _siglip2,
+    "clip": _clip,
+    "dinotxt": _dinotxt,
+}
+WITHOUT_WEIGHTS = ("attributes",)
 
 
 def open_backend(name: str, options: BackendOptions | None = None) -> SaliencyBackend:
-    """The backend of this name. Raises ConfigError that lists those that there are."""
+    """The backend of this name, or of several: NAME[*WEIGHT]+NAME[*WEIGHT]... asks them together.
+
+    Raises ConfigError that lists those that there are.
+    """
+    options = options or BackendOptions()
+    parts = [_part(text, name) for text in name.split("+")]
+    if len(parts) == 1 and parts[0][1] == 1:
+        return BACKENDS[parts[0][0]](options)
+    if len({part for part, _ in parts}) < len(parts):
+        raise ConfigError(f"backend {name!r} has a part twice")
+    from tracker.saliency.combined import Combined
+
+    bare = BackendOptions(None, options.device)
+    return Combined([(BACKENDS[p](bare if p in WITHOUT_WEIGHTS else options), w) for p, w in parts])
+
+
+def _part(text: str, whole: str) -> tuple[str, float]:
+    name, separator, weight = text.partition("*")
     if name not in BACKENDS:
         raise ConfigError(f"there is no saliency backend {name!r}; expected one of {', '.join(BACKENDS)}")
-    return BACKENDS[name](options or BackendOptions())
+    try:
+        share = float(weight) if separator else 1.0
+    except ValueError:
+        share = 0.0
+    if not 0 < share <= 1:
+        raise ConfigError(f"backend {whole!r}: a weight is a number over 0 and up to 1, got {weight!r}")
+    return name, share
