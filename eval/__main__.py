@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from eval.bench.saliency import SaliencyBench
 from tracker.terminal import STDERR, progress, run
 
 if TYPE_CHECKING:
@@ -98,7 +99,7 @@ class Track:
                 exclude=tracked.reference_frames,
                 protocol={
                     "backend": f"{backend.name} ({backend.fingerprint})",
-                    "weights": self.weights or "the backend's default",
+                    "weights": backend.weights,
                     "vocabulary": self.vocabulary or "the backend's own",
                     "views": self.views,
                     "masks": "the dataset's visible masks",
@@ -161,7 +162,11 @@ class Score:
 
 def main() -> None:
     run(
-        tyro.extras.subcommand_cli_from_dict({"track": Track, "score": Score}, prog="python -m eval", args=sys.argv[1:])
+        tyro.extras.subcommand_cli_from_dict(
+            {"track": Track, "score": Score, "bench saliency": SaliencyBench},
+            prog="python -m eval",
+            args=sys.argv[1:],
+        )
     )
 
 

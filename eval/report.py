@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
 from collections.abc import Mapping
 from html import escape
@@ -15,6 +16,7 @@ from rich.table import Table
 
 from eval.plots import error_curve, error_over_time
 from eval.score import Metrics, Scores
+from tracker.errors import OutputError
 
 # name in scores.json -> heading, digits
 COLUMNS = {
@@ -48,6 +50,17 @@ def environment() -> dict[str, str]:
 def write_scores(path: Path, scores: Scores, extra: Mapping[str, object]) -> None:
     """scores.json: protocol and metrics, and beside them what the caller adds."""
     path.write_text(json.dumps({**scores.as_json(), **extra}, indent=1, allow_nan=False) + "\n")
+
+
+def write_figures(path: Path, figures: Mapping[str, object]) -> None:
+    """Figures of a measurement as JSON, with what it ran on; whole or not at all. Raises OutputError."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(json.dumps({**figures, "environment": environment()}, indent=1, allow_nan=False) + "\n")
+        partial.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
 
 
 def table(scores: Scores, title: str) -> Table:

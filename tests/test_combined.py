@@ -21,7 +21,7 @@ from tracker.view import ObjectView, ViewConfig, view_object
 class Halves:
     """Knows "left" and "right", of the box of the view."""
 
-    name, fingerprint = "halves", "halves-1"
+    name, weights, fingerprint = "halves", "none", "halves-1"
 
     def labels_for(self, wanted: Sequence[str] | None) -> tuple[str, ...]:
         return tuple(wanted or ("left", "right"))

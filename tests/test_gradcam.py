@@ -74,7 +74,7 @@ def texts_of(encoder: Any) -> torch.Tensor:
 
 def test_siglip_maps_are_those_of_a_backward_pass_a_concept(folders: dict[str, Path]) -> None:
     encoder = SiglipEncoder(BackendOptions(str(folders["siglip2"]), "cpu"))
-    texts, vision = texts_of(encoder), encoder._network.vision_model
+    texts, vision = texts_of(encoder), encoder.network.vision_model
 
     def score() -> torch.Tensor:
         picture = torch.nn.functional.normalize(vision(pixel_values=pictures(2)).pooler_output, dim=1)
@@ -135,7 +135,7 @@ def test_nothing_is_left_on_the_network() -> None:
     net, x = Net(), torch.rand(2, 3, 4)
     before = state_of(net)
     with GradCam(net, net.layer) as gradcam:
-        assert state_of(net) == (1, [False] * 4)
+        assert state_of(net) == (2, [False] * 4)
         assert gradcam(lambda: net(x), as_picture).shape == (2, 3, 1, 3)
     assert state_of(net) == before == (0, [True, True, True, False])
     assert all(parameter.grad is None for parameter in net.parameters())
@@ -171,7 +171,7 @@ def test_a_layer_that_does_not_run_is_an_error() -> None:
 def test_the_graph_begins_at_the_layer(tmp_path: Path) -> None:
     """What lies before it keeps nothing for a backward pass."""
     encoder = SiglipEncoder(BackendOptions(str(save_siglip(tmp_path)), "cpu"))
-    vision, seen = encoder._network.vision_model, []
+    vision, seen = encoder.network.vision_model, []
     hook = vision.encoder.register_forward_hook(lambda m, i, o: seen.append(o.last_hidden_state.requires_grad))  # noqa: ARG005
     encoder.maps(pictures(2), texts_of(encoder))
     hook.remove()

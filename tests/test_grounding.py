@@ -28,7 +28,7 @@ UNSEEN = (12, 25, 40, 55, 70)  # frames of the scene of which no model is made
 class Planted:
     """A backend that also knows the handle: it is wherever a pixel is nearly of its colour, whatever the light."""
 
-    name, fingerprint = "planted", "planted-1"
+    name, weights, fingerprint = "planted", "none", "planted-1"
 
     def labels_for(self, wanted: Sequence[str] | None) -> tuple[str, ...]:
         if wanted is not None and set(wanted) - {"handle", *TERMS}:

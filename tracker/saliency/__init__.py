@@ -62,11 +62,15 @@ class Query:
 class SaliencyBackend(Protocol):
     """Finds concepts in views of objects; queries of several objects or frames at once may share a batch.
 
-    name: as in `--backend`. fingerprint: changes whenever its maps of the same query would.
+    name: as in `--backend`. weights: which it has, for reports. fingerprint: changes whenever its maps of the same
+    query would.
     """
 
     @property
     def name(self) -> str: ...
+
+    @property
+    def weights(self) -> str: ...
 
     @property
     def fingerprint(self) -> str: ...

@@ -60,7 +60,7 @@ class Attributes:
     A label may be one of its terms, or a phrase that has some of them in it: "red handle" is where it is red.
     """
 
-    name = "attributes"
+    name, weights = "attributes", "none"
     fingerprint = fingerprint_of(
         "attributes",
         repr((COLOUR_TERMS, LIGHTNESS_WEIGHT, COLOUR_SOFTNESS, COLOUR_SCALES, RELATIVE_SCALES, RELATIVE_FULL))

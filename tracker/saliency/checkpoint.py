@@ -15,6 +15,7 @@ from tracker.errors import ConfigError
 logger = logging.getLogger(__name__)
 
 FILES = ("*.json", "*.safetensors", "*.model", "*.txt")  # nothing that could hold code
+RANDOM = "random_weights"  # key in config.json of weights that mean nothing, so that a report can say so
 BLOCKS, BLOCK_BYTES = 64, 4096  # of a weight file that go into its identity
 
 
@@ -29,11 +30,12 @@ class Published:
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
     """Weights on this machine. folder: with config.json, safetensors and a tokenizer. config: that file's content.
-    identity: alike for copies of the same weights, and for no others."""
+    identity: alike for copies of the same weights, and for no others. called: what a report calls them."""
 
     folder: Path
     config: Mapping[str, Any]
     identity: str
+    called: str
 
 
 def find_checkpoint(
@@ -52,7 +54,7 @@ def find_checkpoint(
                 f"there are no weights {name!r}: expected a folder, a name on the hub, or one of {', '.join(sizes)}"
             )
         folder = _from_hub(name, published.gigabytes if published else None)
-    return _checked(folder, model_types)
+    return _checked(folder, name, model_types)
 
 
 def _from_hub(name: str, gigabytes: float | None) -> Path:
@@ -75,7 +77,7 @@ def _from_hub(name: str, gigabytes: float | None) -> Path:
         ) from error
 
 
-def _checked(folder: Path, model_types: Sequence[str]) -> Checkpoint:
+def _checked(folder: Path, name: str, model_types: Sequence[str]) -> Checkpoint:
     path = folder / "config.json"
     try:
         config = json.loads(path.read_text(encoding="utf-8"))
@@ -90,7 +92,8 @@ def _checked(folder: Path, model_types: Sequence[str]) -> Checkpoint:
     digest = hashlib.sha256(path.read_bytes())
     for file in files:
         _sample(file, digest)
-    return Checkpoint(folder, config, digest.hexdigest())
+    called = f"random weights ({name})" if config.get(RANDOM) else name
+    return Checkpoint(folder, config, digest.hexdigest(), called)
 
 
 def _sample(file: Path, digest: Any) -> None:

@@ -30,7 +30,7 @@ class ClipEncoder:
 
     def __init__(self, options: BackendOptions) -> None:
         checkpoint = find_checkpoint(options.weights, SIZES, "large", ["clip"])
-        self.identity = checkpoint.identity
+        self.identity, self.weights = checkpoint.identity, checkpoint.called
         self._device = torch_device(options.device)
         self._dtype = precision(self._device)
         network: Any = CLIPModel.from_pretrained(

@@ -21,6 +21,7 @@ class Combined:
     def __init__(self, parts: Sequence[tuple[SaliencyBackend, float]]) -> None:
         self._parts = parts
         self.name = "+".join(backend.name if w == 1 else f"{backend.name}*{w:g}" for backend, w in parts)
+        self.weights = ", ".join(f"{backend.name}: {backend.weights}" for backend, _ in parts)
         self.fingerprint = fingerprint_of(self.name, " ".join(backend.fingerprint for backend, _ in parts))
         self._own = [backend.labels_for(None) for backend, _ in parts[1:]]
 

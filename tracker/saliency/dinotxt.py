@@ -67,7 +67,8 @@ class DinotxtEncoder:
             raise ConfigError("backend dinotxt has no weights that can be fetched: give a folder with --weights")
         checkpoint = find_checkpoint(options.weights, {}, "", ["dinotxt"])
         folder = checkpoint.folder
-        self.size_px, self.identity = int(checkpoint.config.get("image_size", 512)), checkpoint.identity
+        self.identity, self.weights = checkpoint.identity, checkpoint.called
+        self.size_px = int(checkpoint.config.get("image_size", 512))
         self._device = torch_device(options.device)
         self._dtype = precision(self._device)
         loading: dict[str, Any] = {"local_files_only": True, "use_safetensors": True, "dtype": self._dtype}

@@ -11,7 +11,7 @@ from transformers import AutoTokenizer, SiglipModel
 from tracker.saliency import BackendOptions
 from tracker.saliency.checkpoint import Published, find_checkpoint
 from tracker.saliency.device import precision, torch_device
-from tracker.saliency.gradcam import GradCam
+from tracker.saliency.gradcam import GradCam, Shortcut
 from tracker.saliency.vision_language import VisionLanguage
 
 SIZES = {
@@ -29,16 +29,17 @@ class SiglipEncoder:
 
     def __init__(self, options: BackendOptions) -> None:
         checkpoint = find_checkpoint(options.weights, SIZES, "giant", ["siglip"])
-        self.identity = checkpoint.identity
+        self.identity, self.weights = checkpoint.identity, checkpoint.called
         self._device = torch_device(options.device)
         self._dtype = precision(self._device)
         network: Any = SiglipModel.from_pretrained(
             checkpoint.folder, local_files_only=True, use_safetensors=True, dtype=self._dtype
         )
-        self._network = network.to(self._device).eval()
+        self.network = network.to(self._device).eval()
         self._tokenizer: Any = AutoTokenizer.from_pretrained(checkpoint.folder, local_files_only=True)
-        self.size_px = int(self._network.config.vision_config.image_size)
-        self.most_tokens = int(self._network.config.text_config.max_position_embeddings)
+        self.size_px = int(self.network.config.vision_config.image_size)
+        self._places = (self.size_px // int(self.network.config.vision_config.patch_size)) ** 2
+        self.most_tokens = int(self.network.config.text_config.max_position_embeddings)
 
     def count_tokens(self, text: str) -> int:
         return len(self._tokenizer(text)["input_ids"])
@@ -49,10 +50,10 @@ class SiglipEncoder:
         tokens = self._tokenizer(
             list(texts), padding="max_length", max_length=self.most_tokens, truncation=True, return_tensors="pt"
         )
-        return self._network.text_model(input_ids=tokens["input_ids"].to(self._device)).pooler_output
+        return self.network.text_model(input_ids=tokens["input_ids"].to(self._device)).pooler_output
 
     def maps(self, pixels: torch.Tensor, texts: torch.Tensor) -> torch.Tensor:
-        vision = self._network.vision_model
+        vision = self.network.vision_model
         pixels, texts = pixels.to(self._device, self._dtype), texts.to(self._device, self._dtype)
         texts = torch.nn.functional.normalize(texts, dim=2)
 
@@ -60,8 +61,21 @@ class SiglipEncoder:
             picture = torch.nn.functional.normalize(vision(pixel_values=pixels).pooler_output, dim=1)
             return (texts @ picture.unsqueeze(2)).squeeze(2)
 
-        with GradCam(vision, vision.post_layernorm) as gradcam:
+        pooling = vision.head.attention
+        shortcut = Shortcut(pooling, lambda gradients: _before_pooling(gradients, pooling, self._places))
+        with GradCam(vision, vision.post_layernorm, shortcut) as gradcam:
             return gradcam(similarity, square)
+
+
+def _before_pooling(gradients: torch.Tensor, pooling: torch.nn.MultiheadAttention, places: int) -> torch.Tensor:
+    """Gradients (L, B, 1, C) behind attention pooling -> (L, B, C) their mean over the tokens before it, exactly.
+
+    Pooling is sum_t a_t V x_t with a = softmax(q K x). The gradient by x_t has a part through V, a_t V^T g, which sums
+    to V^T g as the a_t sum to one, and a part through a, which sums to nothing as the a_t can only grow at one
+    another's expense. So of the tokens' gradients, the dearest part of GradCAM here, none is needed.
+    """
+    value = pooling.in_proj_weight[2 * pooling.embed_dim :]
+    return gradients[:, :, 0] @ pooling.out_proj.weight @ value / places
 
 
 def square(tokens: torch.Tensor) -> torch.Tensor:

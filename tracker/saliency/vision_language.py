@@ -27,12 +27,16 @@ CROPS_KEPT = 64
 class Encoder(Protocol):
     """A vision-language network.
 
-    identity: of its weights. size_px: side of the square picture that it takes. prompt: of a label, with "{}".
-    mean, std: (3,) of the channels in [0, 1], by which pictures are normalised. most_tokens: that a text may have.
+    identity: of its weights. weights: what they are called. size_px: side of the square picture that it takes.
+    prompt: of a label, with "{}". mean, std: (3,) of the channels in [0, 1], by which pictures are normalised.
+    most_tokens: that a text may have.
     """
 
     @property
     def identity(self) -> str: ...
+
+    @property
+    def weights(self) -> str: ...
 
     @property
     def size_px(self) -> int: ...
@@ -68,7 +72,7 @@ class VisionLanguage:
     """
 
     def __init__(self, name: str, encoder: Encoder) -> None:
-        self.name = name
+        self.name, self.weights = name, encoder.weights
         self._encoder = encoder
         self.fingerprint = fingerprint_of(name, f"{encoder.identity} {encoder.prompt} {encoder.size_px}")
         self._text = TextCache(encoder.identity, encoder.encode_texts)

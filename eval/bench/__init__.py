@@ -1,0 +1,1 @@
+"""Measurements of speed: ratios between two ways of the same work, in one run."""
