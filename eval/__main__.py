@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from eval.bench.registration import RegistrationBench
 from eval.bench.saliency import SaliencyBench
 from tracker.terminal import STDERR, progress, run
 
@@ -160,10 +161,23 @@ class Score:
         STDERR.print(table(scores, f"{self.results} on {self.dataset}"))
 
 
+@dataclass
+class Bench:
+    """Measure speed, as ratios between ways of the same work in one run."""
+
+    what: tyro.conf.OmitArgPrefixes[
+        Annotated[SaliencyBench, tyro.conf.subcommand("saliency", prefix_name=False)]
+        | Annotated[RegistrationBench, tyro.conf.subcommand("registration", prefix_name=False)]
+    ]
+
+    def __call__(self) -> None:
+        self.what()
+
+
 def main() -> None:
     run(
         tyro.extras.subcommand_cli_from_dict(
-            {"track": Track, "score": Score, "bench saliency": SaliencyBench},
+            {"track": Track, "score": Score, "bench": Bench},
             prog="python -m eval",
             args=sys.argv[1:],
         )
