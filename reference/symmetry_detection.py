@@ -1,0 +1,131 @@
+"""Is an object the same after a turn? What the model's self-alignment says where it has seen both sides of the turn.
+
+Conservative: what was not seen is not known, and a symmetry that is not known is not declared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from reference.self_alignment import SelfAlignment
+from tracker.concept import ConceptModel
+from tracker.errors import ConfigError
+from tracker.geometry import Floats
+from tracker.symmetry import NO_SYMMETRY, Symmetry, about
+
+CONTINUUM = 24  # turns that stand for all
+TURNS_A_ROUND = (6, 5, 4, 3, 2)
+# Of the points. A single turn that lays a face on itself says nothing of the others: half of what is known has to
+# speak. Of the turns about a free axis every one has, so a third at the least will do for each.
+LEAST_OVERLAP, LEAST_OVERLAP_OF_EACH = 0.5, 1 / 3
+FITTING_STEPS = 10
+FITTING_SIGMA = 0.01  # of the diameter: how far the normals of a solid of revolution may miss its axis
+SQUARE_COSINE = np.sin(np.radians(10))  # faces nearer to square than this are taken for square
+FACE_COSINE = np.cos(np.radians(10))
+FACES = 4
+OUTLIERS = 0.5  # percent at each end that do not count for where the middle is
+
+
+def detect_symmetry(model: ConceptModel) -> Symmetry:
+    """The turns after which shape and paint of the model are the same, about an axis that its shape suggests.
+
+    A free axis before single turns; of those the most that hold together. Paint breaks what shape allows: a can with a
+    label has no symmetry. NO_SYMMETRY where nothing was found, or too little was seen to know.
+    """
+    alignment = SelfAlignment(model)
+    return _free_axis(model, alignment) or _turns(model, alignment) or NO_SYMMETRY
+
+
+def _free_axis(model: ConceptModel, alignment: SelfAlignment) -> Symmetry | None:
+    axis, origin_m = revolution_axis(model)
+    origin_m = origin_m + axis * (_middle(model.points @ axis) - axis @ origin_m)
+    turns = (about(axis, angle_rad) for angle_rad in 2 * np.pi * np.arange(1, CONTINUUM) / CONTINUUM)
+    if not all(alignment.evidence(turn, origin_m).speaks_for_it(LEAST_OVERLAP_OF_EACH) for turn in turns):
+        return None
+    swap = about(np.linalg.svd(axis[None])[2][1], np.pi)
+    ends = [swap] if alignment.evidence(swap, origin_m).speaks_for_it(LEAST_OVERLAP) else []
+    return Symmetry.generated(ends, origin_m, axis)
+
+
+def _turns(model: ConceptModel, alignment: SelfAlignment) -> Symmetry | None:
+    """Of all groups that one or two of the candidate axes generate, the largest whose every turn holds."""
+    best: Symmetry | None = None
+    for frame in _frames(model):
+        origin_m = frame.T @ [_middle(model.points @ axis) for axis in frame]
+        found = [(about(axis, 2 * np.pi / n), n) for axis in frame if (n := _most_turns(alignment, axis, origin_m)) > 1]
+        for some in (found, *combinations(found, 2), *combinations(found, 1)):
+            try:
+                group = Symmetry.generated([turn for turn, _ in some], origin_m)
+            except ConfigError:  # axes with many turns that do not belong together
+                continue
+            if len(group.turns) > (1 if best is None else len(best.turns)) and _holds(alignment, group):
+                best = group
+    return best
+
+
+def _most_turns(alignment: SelfAlignment, axis: Floats, origin_m: Floats) -> int:
+    """How many turns a round look the same, 1 where only the whole one does."""
+    for n in TURNS_A_ROUND:
+        if _holds(alignment, Symmetry.generated([about(axis, 2 * np.pi / n)], origin_m)):
+            return n
+    return 1
+
+
+def _holds(alignment: SelfAlignment, group: Symmetry) -> bool:
+    return all(alignment.evidence(turn, group.origin_m).speaks_for_it(LEAST_OVERLAP) for turn in group.turns[1:])
+
+
+def revolution_axis(model: ConceptModel) -> tuple[Floats, Floats]:
+    """Unit axis (3,) and a point (3,) on it that the normals of the surface meet, as those of a solid of revolution do.
+
+    The line through p along n meets the axis (a through o, moment m = o x a) where n . m + (p x n) . a = 0 (Pottmann and
+    Randrup, Rotational and helical surface approximation for reverse engineering, Computing 60, 1998): least squares
+    with |a| = 1 and m eliminated, reweighted so that a handle does not count (Geman-McClure).
+    """
+    centre_m = model.points.mean(axis=0)
+    points, normals = (model.points - centre_m) / model.diameter_m, model.normals
+    moments, weights = np.cross(points, normals), np.ones(len(model))
+    axis, moment = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    for _ in range(FITTING_STEPS):
+        of_axis, mixed = (weights[:, None] * moments).T @ moments, (weights[:, None] * normals).T @ moments
+        to_moment = -np.linalg.pinv((weights[:, None] * normals).T @ normals, rcond=1e-4, hermitian=True) @ mixed
+        axis = np.linalg.eigh(of_axis + mixed.T @ to_moment)[1][:, 0]
+        moment = to_moment @ axis
+        missed = normals @ moment + moments @ axis
+        weights = 1 / (1 + (missed / FITTING_SIGMA) ** 2) ** 2
+    return axis, centre_m + np.cross(axis, moment) * model.diameter_m
+
+
+def _frames(model: ConceptModel) -> Iterator[Floats]:
+    """Right-angled axes (3, 3), a row each, that the object's symmetry may have: of its points and of its faces."""
+    yield np.linalg.eigh(np.cov(model.points.T))[1].T
+    yield np.linalg.eigh(model.normals.T @ model.normals)[1].T
+    faces = _faces(model.normals)
+    for a, b in combinations(faces, 2):
+        if abs(a @ b) < SQUARE_COSINE:
+            b = b - a * (a @ b)
+            b = b / np.linalg.norm(b)
+            yield np.stack((a, b, np.cross(a, b)))
+
+
+def _faces(normals: Floats) -> list[Floats]:
+    """The directions (up to sign) that most of the surface faces."""
+    faces: list[Floats] = []
+    left = normals
+    while len(left) and len(faces) < FACES:
+        some = left[:: max(1, len(left) // 500)]
+        face = some[(np.abs(some @ left.T) > FACE_COSINE).sum(axis=1).argmax()]
+        for _ in range(3):
+            along = left @ face
+            face = (left * np.where(np.abs(along) > FACE_COSINE, np.sign(along), 0)[:, None]).sum(axis=0)
+            face = face / np.linalg.norm(face)
+        faces.append(face)
+        left = left[np.abs(left @ face) <= FACE_COSINE]
+    return faces
+
+
+def _middle(along_m: Floats) -> float:
+    return float(np.percentile(along_m, [OUTLIERS, 100 - OUTLIERS]).mean())
