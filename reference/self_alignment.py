@@ -28,7 +28,7 @@ QUANTILE = 90  # a tenth of the surface may be edges and highlights
 
 # What was measured on objects that are symmetric, most in uneven light: 9 in hue and 8 in pattern. Prints on cartons
 # and cans: 15 and more in pattern, even where their colours are few.
-MOST_HUE, MOST_PATTERN = 12.0, 11.0  # CIE Lab units
+MOST_HUE, MOST_PATTERN = 11.0, 11.0  # CIE Lab units
 MOST_DENIED = 0.02
 LEAST_AGREEMENT = 0.9
 
@@ -49,9 +49,11 @@ class TurnEvidence:
     hue: float
     pattern: float
 
-    def speaks_for_it(self, least_overlap: float) -> bool:
-        shape = self.overlap >= least_overlap and self.agreement >= LEAST_AGREEMENT and self.denied <= MOST_DENIED
-        return shape and self.hue <= MOST_HUE and self.pattern <= MOST_PATTERN
+    def shape_fits(self, least_overlap: float) -> bool:
+        return self.overlap >= least_overlap and self.agreement >= LEAST_AGREEMENT and self.denied <= MOST_DENIED
+
+    def fits(self, least_overlap: float) -> bool:
+        return self.shape_fits(least_overlap) and self.hue <= MOST_HUE and self.pattern <= MOST_PATTERN
 
 
 class SelfAlignment:
@@ -82,7 +84,7 @@ class SelfAlignment:
             pattern=float(np.percentile(np.linalg.norm(self._pattern[a] - self._pattern[b], axis=1), QUANTILE)),
         )
 
-    def aligned(self, axis: Floats, angle_rad: float, origin_m: Floats) -> tuple[Floats, Floats]:
+    def aligned(self, axis: Floats, origin_m: Floats, angle_rad: float) -> tuple[Floats, Floats]:
         """A unit axis (3,) and a point on it (3,), moved to where a turn by the angle lays the model best on itself.
 
         Gauss-Newton on point-to-plane distances of the turned model to the model; the motion found is the turn about

@@ -6,6 +6,7 @@ Conservative: what was not seen is not known, and a symmetry that is not known i
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import combinations
 
 import numpy as np
@@ -17,6 +18,7 @@ from tracker.geometry import Floats
 from tracker.symmetry import NO_SYMMETRY, Symmetry, about
 
 CONTINUUM = 24  # turns that stand for all
+ALIGNING_RAD = np.radians(105)  # far enough to tell a tilt, short enough to overlap; no turn of a common polygon
 TURNS_A_ROUND = (6, 5, 4, 3, 2)
 # Of the points. A single turn that lays a face on itself says nothing of the others: half of what is known has to
 # speak. Of the turns about a free axis every one has, so a third at the least will do for each.
@@ -36,46 +38,43 @@ def detect_symmetry(model: ConceptModel) -> Symmetry:
     label has no symmetry. NO_SYMMETRY where nothing was found, or too little was seen to know.
     """
     alignment = SelfAlignment(model)
-    return _free_axis(model, alignment) or _turns(model, alignment) or NO_SYMMETRY
-
-
-def _free_axis(model: ConceptModel, alignment: SelfAlignment) -> Symmetry | None:
-    axis, origin_m = revolution_axis(model)
+    axis, origin_m = alignment.aligned(*revolution_axis(model), ALIGNING_RAD)
     origin_m = origin_m + axis * (_middle(model.points @ axis) - axis @ origin_m)
-    turns = (about(axis, angle_rad) for angle_rad in 2 * np.pi * np.arange(1, CONTINUUM) / CONTINUUM)
-    if not all(alignment.evidence(turn, origin_m).speaks_for_it(LEAST_OVERLAP_OF_EACH) for turn in turns):
-        return None
-    swap = about(np.linalg.svd(axis[None])[2][1], np.pi)
-    ends = [swap] if alignment.evidence(swap, origin_m).speaks_for_it(LEAST_OVERLAP) else []
-    return Symmetry.generated(ends, origin_m, axis)
+    turns = [about(axis, 2 * np.pi * k / CONTINUUM) for k in range(1, CONTINUUM)]
+    round_about = [alignment.evidence(turn, origin_m) for turn in turns]
+    if all(evidence.fits(LEAST_OVERLAP_OF_EACH) for evidence in round_about):
+        swap = about(_across(axis), np.pi)
+        swaps = [swap] if alignment.evidence(swap, origin_m).fits(LEAST_OVERLAP) else []
+        return Symmetry.generated(swaps, origin_m, axis)
+    # Paint on a solid of revolution that happens to fit after some turns is chance, or hides its difference.
+    of_revolution = sum(evidence.shape_fits(LEAST_OVERLAP_OF_EACH) for evidence in round_about) > CONTINUUM / 2
+    return _turns(model, alignment, axis if of_revolution else np.zeros(3))
 
 
-def _turns(model: ConceptModel, alignment: SelfAlignment) -> Symmetry | None:
-    """Of all groups that one or two of the candidate axes generate, the largest whose every turn holds."""
-    best: Symmetry | None = None
+def _turns(model: ConceptModel, alignment: SelfAlignment, barred: Floats) -> Symmetry:
+    """Of all groups that one or more of the candidate axes generate, the largest whose every turn fits; no axis is
+    along the barred one."""
+    best = NO_SYMMETRY
     for frame in _frames(model):
         origin_m = frame.T @ [_middle(model.points @ axis) for axis in frame]
-        found = [(about(axis, 2 * np.pi / n), n) for axis in frame if (n := _most_turns(alignment, axis, origin_m)) > 1]
-        for some in (found, *combinations(found, 2), *combinations(found, 1)):
-            try:
-                group = Symmetry.generated([turn for turn, _ in some], origin_m)
-            except ConfigError:  # axes with many turns that do not belong together
-                continue
-            if len(group.turns) > (1 if best is None else len(best.turns)) and _holds(alignment, group):
-                best = group
+        axes = [axis for axis in frame if abs(axis @ barred) < FACE_COSINE]
+        steps = [about(axis, 2 * np.pi / n) for axis in axes if (n := _most_turns(alignment, axis, origin_m)) > 1]
+        for some in (steps, *combinations(steps, 2), *combinations(steps, 1)):
+            with suppress(ConfigError):  # turns by 120 and by 90 degrees about square axes belong to no object
+                group = Symmetry.generated(some, origin_m)
+                if len(group.turns) > len(best.turns) and _fits(alignment, group):
+                    best = group
     return best
 
 
 def _most_turns(alignment: SelfAlignment, axis: Floats, origin_m: Floats) -> int:
     """How many turns a round look the same, 1 where only the whole one does."""
-    for n in TURNS_A_ROUND:
-        if _holds(alignment, Symmetry.generated([about(axis, 2 * np.pi / n)], origin_m)):
-            return n
-    return 1
+    rounds = (n for n in TURNS_A_ROUND if _fits(alignment, Symmetry.generated([about(axis, 2 * np.pi / n)], origin_m)))
+    return next(rounds, 1)
 
 
-def _holds(alignment: SelfAlignment, group: Symmetry) -> bool:
-    return all(alignment.evidence(turn, group.origin_m).speaks_for_it(LEAST_OVERLAP) for turn in group.turns[1:])
+def _fits(alignment: SelfAlignment, group: Symmetry) -> bool:
+    return all(alignment.evidence(turn, group.origin_m).fits(LEAST_OVERLAP) for turn in group.turns[1:])
 
 
 def revolution_axis(model: ConceptModel) -> tuple[Floats, Floats]:
@@ -129,3 +128,8 @@ def _faces(normals: Floats) -> list[Floats]:
 
 def _middle(along_m: Floats) -> float:
     return float(np.percentile(along_m, [OUTLIERS, 100 - OUTLIERS]).mean())
+
+
+def _across(axis: Floats) -> Floats:
+    """(3,) a unit vector at a right angle to another."""
+    return np.asarray(np.linalg.svd(axis[None])[2][1], np.float64)

@@ -52,6 +52,12 @@ class Symmetry:
             reached = group[before:]
         return cls(group, origin_m)
 
+    def __str__(self) -> str:
+        if self.axis is None:
+            return "none" if self.trivial else f"{len(self.turns)} turns look the same"
+        ends = ", and its ends may be swapped" if len(self.turns) > 1 else ""
+        return f"any turn about ({', '.join(f'{part:.2f}' for part in self.axis)}) looks the same{ends}"
+
     @property
     def trivial(self) -> bool:
         return len(self.turns) == 1 and self.axis is None
