@@ -26,9 +26,9 @@ SAMPLE, WIDE_SAMPLE = 1500, 1000
 ALIGNING_STEPS = 6
 QUANTILE = 90  # a tenth of the surface may be edges and highlights
 
-# What was measured on objects that are symmetric, most in uneven light: 9 in hue and 8 in pattern. Prints on cartons
-# and cans: 15 and more in pattern, even where their colours are few.
-MOST_HUE, MOST_PATTERN = 11.0, 11.0  # CIE Lab units
+# CIE Lab units. Measured between places of the same paint in uneven light: up to 10 in hue and 12 in pattern; where
+# prints meet: 15 and more in one of them, mostly in both, on cartons of few colours too.
+MOST_HUE, MOST_PATTERN = 11.0, 12.5
 MOST_DENIED = 0.02
 LEAST_AGREEMENT = 0.9
 
@@ -96,7 +96,8 @@ class SelfAlignment:
             _, index, meets = self._met(points, turn, reach=2)
             if meets.sum() < 6:
                 break
-            p, q, n = points[meets] - origin_m, self._model.points[index[meets]] - origin_m, self._model.normals[index[meets]]
+            p, q = points[meets] - origin_m, self._model.points[index[meets]] - origin_m
+            n = self._model.normals[index[meets]]
             jacobian = np.concatenate((np.cross(p, n), n * self._model.diameter_m), axis=1)
             damped = jacobian.T @ jacobian + 1e-6 * self._model.diameter_m**2 * len(p) * np.eye(6)
             motion = -np.linalg.solve(damped, jacobian.T @ ((p - q) * n).sum(axis=1))

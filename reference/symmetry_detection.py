@@ -80,9 +80,9 @@ def _fits(alignment: SelfAlignment, group: Symmetry) -> bool:
 def revolution_axis(model: ConceptModel) -> tuple[Floats, Floats]:
     """Unit axis (3,) and a point (3,) on it that the normals of the surface meet, as those of a solid of revolution do.
 
-    The line through p along n meets the axis (a through o, moment m = o x a) where n . m + (p x n) . a = 0 (Pottmann and
-    Randrup, Rotational and helical surface approximation for reverse engineering, Computing 60, 1998): least squares
-    with |a| = 1 and m eliminated, reweighted so that a handle does not count (Geman-McClure).
+    The line through p along n meets the axis (a through o, moment m = o x a) where n . m + (p x n) . a = 0 (Pottmann
+    and Randrup, Rotational and helical surface approximation for reverse engineering, Computing 60, 1998): least
+    squares with |a| = 1 and m eliminated, reweighted so that a handle does not count (Geman-McClure).
     """
     centre_m = model.points.mean(axis=0)
     points, normals = (model.points - centre_m) / model.diameter_m, model.normals

@@ -27,8 +27,8 @@ FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("
 ORDER = {
     "tracker": (
         "errors", "geometry", "frame", "sources", "view", "saliency", "cloud", "region", "reference_views",
-        "grounding", "symmetry", "declared_symmetry", "concept", "matching", "appearance", "projection", "least_squares", "closest_points",
-        "umeyama", "hypotheses", "registration", "verification", "refinement", "pose_filter", "config",
+        "grounding", "symmetry", "declared_symmetry", "concept", "matching", "appearance", "projection",
+        "least_squares", "closest_points", "umeyama", "hypotheses", "registration", "verification", "refinement", "pose_filter", "config",
         "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
     ),
     "reference": (

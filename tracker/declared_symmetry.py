@@ -13,8 +13,8 @@ from tracker.geometry import Floats, Pose
 from tracker.symmetry import MOST_TURNS, NO_SYMMETRY, SAME_ELEMENT, Symmetry, about, angles_rad
 
 GRAMMAR = (
-    "none, or AXIS:ANGLE, several joined by commas; AXIS is x, y, z or a vector like 0.1/0.2/0.97 in object coordinates, "
-    "ANGLE is inf or degrees that divide 360, 180 at most: z:inf or x:180,y:180"
+    "none, or AXIS:ANGLE, several joined by commas; AXIS is x, y, z or a vector like 0.1/0.2/0.97 in object "
+    "coordinates, ANGLE is inf or degrees that divide 360, 180 at most: z:inf or x:180,y:180"
 )
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 FIXED_POINT_SLACK_M = 0.002  # what a dataset's turns may miss a common fixed point by; they are measured, not exact
@@ -65,7 +65,7 @@ def from_models_info(entry: Mapping[str, Any]) -> Symmetry:
             f"models_info.json: no point stays where it is under all of an object's symmetries, the best moves by "
             f"{1000 * off_m:.1f} mm (up to {1000 * FIXED_POINT_SLACK_M:.0f} mm is taken for rounding)"
         )
-    turns = [np.eye(3)]
+    turns: list[Floats] = [np.eye(3)]
     for pose in listed:
         if angles_rad(np.stack(turns), pose.rotation).min() > SAME_ELEMENT:
             turns.append(pose.rotation)

@@ -61,7 +61,7 @@ class Refined:
             return self
         # A turn w and a shift v about the new origin are, about the old one at d from it, w and v + w x d.
         d_m, carried = self.T_cam_obj.translation_m - pose.translation_m, np.eye(6)
-        carried[3:, :3] = -np.cross(np.eye(3), d_m).T @ np.eye(3)
+        carried[3:, :3] = np.cross(np.eye(3), d_m).T
         return replace(self, T_cam_obj=pose, information=carried.T @ self.information @ carried)
 
 

@@ -87,7 +87,7 @@ class Symmetry:
 
     def same(self, a: Pose, b: Pose, angle_rad: float, distance_m: float) -> bool:
         """Whether two poses are equivalent up to an angle and a distance, that of the symmetry's origin."""
-        apart_m = np.linalg.norm((a @ self.origin_m[None] - b @ self.origin_m[None]))
+        apart_m = np.linalg.norm(a @ self.origin_m[None] - b @ self.origin_m[None])
         return bool(apart_m <= distance_m) and self.nearest(a, b).angle_to_rad(b) <= angle_rad
 
     def distinct(self, poses: Sequence[Pose], angle_rad: float, distance_m: float) -> list[int]:
@@ -116,8 +116,8 @@ class Symmetry:
             raise ValueError(f"a symmetry has turns, origin_m and axis: {error!r}") from error
         if turns.ndim != 3 or turns.shape[1:] != (3, 3) or not 1 <= len(turns) <= MOST_TURNS:
             raise ValueError(f"a symmetry has 1 to {MOST_TURNS} turns of 3x3, got shape {turns.shape}")
-        off = np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max()
-        if not off < ROTATION_TOLERANCE or np.linalg.det(turns).min() < 0 or angles_rad(turns[:1], np.eye(3))[0] > SAME_ELEMENT:
+        off = max(np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max(), np.abs(turns[0] - np.eye(3)).max())
+        if not off < ROTATION_TOLERANCE or np.linalg.det(turns).min() < 0:
             raise ValueError("a symmetry's turns are rotations, the identity first")
         if origin_m.shape != (3,) or not np.isfinite(origin_m).all():
             raise ValueError(f"a symmetry's origin_m is three finite numbers, got {origin_m.tolist()}")
