@@ -24,13 +24,14 @@ SAME_SIDE, SAME_SLOPE = 0.5, 0.87  # cosines: the same side of a wall, and a slo
 NEIGHBOURS, FINE_NEIGHBOURS, WIDE_NEIGHBOURS = 8, 60, 64
 SAMPLE, WIDE_SAMPLE = 1500, 1000
 ALIGNING_STEPS = 6
-QUANTILE = 90  # a tenth of the surface may be edges and highlights
+QUANTILE, SPOT_QUANTILE = 90, 98  # a tenth may be edges and highlights of the light, a fiftieth may be anything
 
-# CIE Lab units. Measured between places of the same paint in uneven light: up to 10 in hue and 12 in pattern; where
-# prints meet: 15 and more in one of them, mostly in both, on cartons of few colours too.
-MOST_HUE, MOST_PATTERN = 11.0, 12.5
+# CIE Lab units. Measured between places of the same paint in uneven light: up to 10 in hue, 12 in pattern, 18 in spots;
+# where prints meet: 15 and more in hue or in pattern, mostly in both, on cartons of few colours too.
+MOST_HUE, MOST_PATTERN, MOST_SPOT = 11.0, 12.5, 20.0
 MOST_DENIED = 0.02
 LEAST_AGREEMENT = 0.9
+LEAST_HOLD = 0.01  # a whole box has ten times that, planes that slide in themselves a third of it (noisy normals)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +40,9 @@ class TurnEvidence:
 
     overlap: meet the model's surface after the turn. agreement: of those that have known surface beside them, meet it.
     denied: lie where a reference view sees that there is nothing. hue: difference in (a, b), pattern: difference in
-    (L, a, b) after the mean of the surroundings is taken off, which differs where the light does; both not exceeded by
-    nine tenths of those that meet.
+    (L, a, b) after the mean of the surroundings is taken off, which differs where the light does; not exceeded by nine
+    tenths of those that meet. spot: as pattern, not exceeded by all but a fiftieth. hold: how firmly what meets holds
+    the body, in the direction in which it does so least, and in the next one.
     """
 
     overlap: float
@@ -48,12 +50,20 @@ class TurnEvidence:
     denied: float
     hue: float
     pattern: float
+    spot: float
+    hold: tuple[float, float]
 
     def shape_fits(self, least_overlap: float) -> bool:
         return self.overlap >= least_overlap and self.agreement >= LEAST_AGREEMENT and self.denied <= MOST_DENIED
 
     def fits(self, least_overlap: float) -> bool:
-        return self.shape_fits(least_overlap) and self.hue <= MOST_HUE and self.pattern <= MOST_PATTERN
+        paint_fits = self.hue <= MOST_HUE and self.pattern <= MOST_PATTERN and self.spot <= MOST_SPOT
+        return paint_fits and self.shape_fits(least_overlap)
+
+    def proves(self, least_overlap: float, free: bool = False) -> bool:
+        """Whether it is more than a plane that slides in itself. free: the body may be turned about an axis anyway, so
+        that one direction need not be held."""
+        return self.fits(least_overlap) and self.hold[1 if free else 0] >= LEAST_HOLD
 
 
 class SelfAlignment:
@@ -73,15 +83,19 @@ class SelfAlignment:
         points = self._turned(turn, origin_m)
         known, index, meets = self._met(points, turn)
         if not meets.any():
-            return TurnEvidence(0.0, 0.0, 0.0, np.inf, np.inf)
+            return TurnEvidence(0.0, 0.0, 0.0, np.inf, np.inf, np.inf, (0.0, 0.0))
         a, b = index[meets], self._sample[meets]
         votes = cross_check(points, self._model.references, SEEN_THROUGH * self._model.diameter_m)
+        hue, pattern = (np.linalg.norm(lab[a] - lab[b], axis=1) for lab in (self._hue, self._pattern))
+        overlap = float(meets.mean())
         return TurnEvidence(
-            overlap=float(meets.mean()),
+            overlap=overlap,
             agreement=float(meets.sum() / known.sum()),
             denied=float((~votes.kept).mean()),
-            hue=float(np.percentile(np.linalg.norm(self._hue[a] - self._hue[b], axis=1), QUANTILE)),
-            pattern=float(np.percentile(np.linalg.norm(self._pattern[a] - self._pattern[b], axis=1), QUANTILE)),
+            hue=float(np.percentile(hue, QUANTILE)),
+            pattern=float(np.percentile(pattern, QUANTILE)),
+            spot=float(np.percentile(pattern, SPOT_QUANTILE)),
+            hold=_hold(points[meets] - origin_m, self._model.normals[a], overlap),
         )
 
     def aligned(self, axis: Floats, origin_m: Floats, angle_rad: float) -> tuple[Floats, Floats]:
@@ -142,3 +156,13 @@ def _axis_of(turn: Floats, near: Floats) -> Floats:
     rotvec = Rotation.from_matrix(turn).as_rotvec()
     axis = rotvec / max(float(np.linalg.norm(rotvec)), 1e-12)
     return axis if axis @ near > 0 else -axis
+
+
+def _hold(points: Floats, normals: Floats, share: float) -> tuple[float, float]:
+    """How firmly surface at points (n, 3), about the origin of a turn, with normals (n, 3) keeps a body in place: the
+    two least eigenvalues of its slippage (Gelfand and Guibas, Shape segmentation using local slippage analysis, 2004),
+    times that surface's share. A plane, which slides in itself, has none."""
+    radius_m = max(float(np.sqrt((points**2).sum(axis=1).mean())), 1e-12)
+    jacobian = np.concatenate((np.cross(points / radius_m, normals), normals), axis=1)
+    least, next_one = np.linalg.eigvalsh(jacobian.T @ jacobian / len(points))[:2] * share
+    return float(least), float(next_one)

@@ -10,6 +10,7 @@ from contextlib import suppress
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from reference.self_alignment import SelfAlignment
 from tracker.concept import ConceptModel
@@ -23,8 +24,9 @@ TURNS_A_ROUND = (6, 5, 4, 3, 2)
 # Of the points. A single turn that lays a face on itself says nothing of the others: half of what is known has to
 # speak. Of the turns about a free axis every one has, so a third at the least will do for each.
 LEAST_OVERLAP, LEAST_OVERLAP_OF_EACH = 0.5, 1 / 3
-FITTING_STEPS = 10
-FITTING_SIGMA = 0.01  # of the diameter: how far the normals of a solid of revolution may miss its axis
+# Of the diameter, how far the normals of a solid of revolution may miss its axis: less at every step, so that a handle
+# neither counts in the end nor decides at the start.
+FITTING_SIGMAS = np.geomspace(0.3, 0.01, 15)
 SQUARE_COSINE = np.sin(np.radians(10))  # faces nearer to square than this are taken for square
 FACE_COSINE = np.cos(np.radians(10))
 FACES = 4
@@ -43,22 +45,25 @@ def detect_symmetry(model: ConceptModel) -> Symmetry:
     turns = [about(axis, 2 * np.pi * k / CONTINUUM) for k in range(1, CONTINUUM)]
     round_about = [alignment.evidence(turn, origin_m) for turn in turns]
     if all(evidence.fits(LEAST_OVERLAP_OF_EACH) for evidence in round_about):
-        swap = about(_across(axis), np.pi)
-        swaps = [swap] if alignment.evidence(swap, origin_m).fits(LEAST_OVERLAP) else []
+        swap = about(_square_to(axis), np.pi)
+        swaps = [swap] if alignment.evidence(swap, origin_m).proves(LEAST_OVERLAP, free=True) else []
         return Symmetry.generated(swaps, origin_m, axis)
-    # Paint on a solid of revolution that happens to fit after some turns is chance, or hides its difference.
+    # The shape fits after any turn, so it says nothing for one of them, and paint that fits by chance is easily found.
     of_revolution = sum(evidence.shape_fits(LEAST_OVERLAP_OF_EACH) for evidence in round_about) > CONTINUUM / 2
-    return _turns(model, alignment, axis if of_revolution else np.zeros(3))
+    return NO_SYMMETRY if of_revolution else _turns(model, alignment)
 
 
-def _turns(model: ConceptModel, alignment: SelfAlignment, barred: Floats) -> Symmetry:
-    """Of all groups that one or more of the candidate axes generate, the largest whose every turn fits; no axis is
-    along the barred one."""
+def _turns(model: ConceptModel, alignment: SelfAlignment) -> Symmetry:
+    """Of all groups that one or more of the candidate axes generate, the largest whose every turn fits."""
     best = NO_SYMMETRY
     for frame in _frames(model):
         origin_m = frame.T @ [_middle(model.points @ axis) for axis in frame]
-        axes = [axis for axis in frame if abs(axis @ barred) < FACE_COSINE]
-        steps = [about(axis, 2 * np.pi / n) for axis in axes if (n := _most_turns(alignment, axis, origin_m)) > 1]
+        rounds = [_most_turns(alignment, axis, origin_m) for axis in frame]
+        for k in np.argsort(rounds)[::-1]:
+            if rounds[k] > 1:  # what fits is laid on itself as well as it can be
+                axis, origin_m = alignment.aligned(frame[k], origin_m, 2 * np.pi / rounds[k])
+                frame = frame @ Rotation.align_vectors(axis, frame[k])[0].as_matrix().T
+        steps = [about(axis, 2 * np.pi / n) for axis, n in zip(frame, rounds, strict=True) if n > 1]
         for some in (steps, *combinations(steps, 2), *combinations(steps, 1)):
             with suppress(ConfigError):  # turns by 120 and by 90 degrees about square axes belong to no object
                 group = Symmetry.generated(some, origin_m)
@@ -74,7 +79,7 @@ def _most_turns(alignment: SelfAlignment, axis: Floats, origin_m: Floats) -> int
 
 
 def _fits(alignment: SelfAlignment, group: Symmetry) -> bool:
-    return all(alignment.evidence(turn, group.origin_m).fits(LEAST_OVERLAP) for turn in group.turns[1:])
+    return all(alignment.evidence(turn, group.origin_m).proves(LEAST_OVERLAP) for turn in group.turns[1:])
 
 
 def revolution_axis(model: ConceptModel) -> tuple[Floats, Floats]:
@@ -88,13 +93,13 @@ def revolution_axis(model: ConceptModel) -> tuple[Floats, Floats]:
     points, normals = (model.points - centre_m) / model.diameter_m, model.normals
     moments, weights = np.cross(points, normals), np.ones(len(model))
     axis, moment = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-    for _ in range(FITTING_STEPS):
+    for sigma in FITTING_SIGMAS:
         of_axis, mixed = (weights[:, None] * moments).T @ moments, (weights[:, None] * normals).T @ moments
         to_moment = -np.linalg.pinv((weights[:, None] * normals).T @ normals, rcond=1e-4, hermitian=True) @ mixed
         axis = np.linalg.eigh(of_axis + mixed.T @ to_moment)[1][:, 0]
         moment = to_moment @ axis
         missed = normals @ moment + moments @ axis
-        weights = 1 / (1 + (missed / FITTING_SIGMA) ** 2) ** 2
+        weights = 1 / (1 + (missed / sigma) ** 2) ** 2
     return axis, centre_m + np.cross(axis, moment) * model.diameter_m
 
 
@@ -130,6 +135,6 @@ def _middle(along_m: Floats) -> float:
     return float(np.percentile(along_m, [OUTLIERS, 100 - OUTLIERS]).mean())
 
 
-def _across(axis: Floats) -> Floats:
+def _square_to(axis: Floats) -> Floats:
     """(3,) a unit vector at a right angle to another."""
     return np.asarray(np.linalg.svd(axis[None])[2][1], np.float64)

@@ -28,8 +28,8 @@ ORDER = {
     "tracker": (
         "errors", "geometry", "frame", "sources", "view", "saliency", "cloud", "region", "reference_views",
         "grounding", "symmetry", "declared_symmetry", "concept", "matching", "appearance", "projection",
-        "least_squares", "closest_points", "umeyama", "hypotheses", "registration", "verification", "refinement", "pose_filter", "config",
-        "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
+        "least_squares", "closest_points", "umeyama", "hypotheses", "registration", "verification", "refinement",
+        "pose_filter", "config", "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",

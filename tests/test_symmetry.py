@@ -205,6 +205,7 @@ def test_bop_s_entry_without_symmetries_has_none() -> None:
         ({"symmetries_discrete": [np.diag([1.0, 1, -1, 1]).ravel().tolist()]}, "cannot be read.*not a rotation"),
         ({"symmetries_discrete": 5}, "cannot be read"),
         ({"symmetries_continuous": [{"axis": [0, 0, 1]}]}, "cannot be read.*offset"),
+        ({"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, float("nan"), 0]}]}, "cannot be read.*finite"),
         ({"symmetries_continuous": [{"axis": [0, 0, 0], "offset": [0, 0, 0]}]}, "cannot be read.*direction"),
         ({"symmetries_continuous": [{"axis": a, "offset": [0, 0, 0]} for a in ([0, 0, 1], [0, 1, 0])]}, "two axes"),
         (

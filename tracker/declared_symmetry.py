@@ -50,7 +50,7 @@ def from_models_info(entry: Mapping[str, Any]) -> Symmetry:
     """
     try:
         listed = [_in_metres(matrix) for matrix in entry.get("symmetries_discrete", ())]
-        free = [(_unit(c["axis"]), np.array(c["offset"], float) / 1000) for c in entry.get("symmetries_continuous", ())]
+        free = [(_unit(c["axis"]), _metres(c["offset"])) for c in entry.get("symmetries_continuous", ())]
         conditions = [(np.eye(3) - pose.rotation, pose.translation_m) for pose in listed]
         conditions += [(_across(axis), _across(axis) @ offset_m) for axis, offset_m in free]
     except (KeyError, TypeError, ValueError, AttributeError, FrameError) as error:
@@ -104,6 +104,14 @@ def _unit(vector: npt.ArrayLike) -> Floats:
 def _across(axis: Floats) -> Floats:
     """(3, 3) what a vector is without its part along a unit axis."""
     return np.eye(3) - np.outer(axis, axis)
+
+
+def _metres(point_mm: npt.ArrayLike) -> Floats:
+    """Raises ValueError where it is no point."""
+    point_m = np.array(point_mm, np.float64) / 1000
+    if point_m.shape != (3,) or not np.isfinite(point_m).all():
+        raise ValueError(f"a point is three finite numbers, got {point_m.tolist()}")
+    return point_m
 
 
 def _in_metres(matrix_mm: npt.ArrayLike) -> Pose:
