@@ -69,6 +69,9 @@ class Reference:
     vocabulary: str | None = None
     """Concepts to look for: a set that comes along (general, ycbv, real275, linemod, toyota-light) or a YAML file.
     Default: the backend's own."""
+    symmetry: str = "auto"
+    """Turns after which the object looks the same: auto detects them, none, or declared ones such as z:inf (any angle
+    about its z axis), x:180, z:90, several joined by commas."""
     ask: Ask = field(default_factory=Ask)
     show: Literal["none", "concepts"] = "none"
     """concepts: write a picture of the concepts' maps beside the model (mug.concept -> mug.concepts.png)."""
@@ -82,6 +85,7 @@ class Reference:
         from reference.plate import write_concept_plate
         from reference.vocabulary import read_vocabulary
         from tracker.config import read_config
+        from tracker.declared_symmetry import parse_symmetry
         from tracker.errors import ConfigError
         from tracker.output import require_free
         from tracker.saliency import BackendOptions, open_backend
@@ -96,11 +100,13 @@ class Reference:
             if path is not None:
                 require_free(path, self.overwrite)
         config = read_config(self.config)
+        symmetry = None if self.symmetry == "auto" else parse_symmetry(self.symmetry)
         labels = read_vocabulary(self.vocabulary).for_object(self.object).labels if self.vocabulary else None
         backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
         source = open_source(self.source)
         frames = read_reference_frames(source, self.object, self.views)
-        model = onboard(frames, backend, config.view, config.cloud, labels or self.ask.labels(frames))
+        labels = labels or self.ask.labels(frames)
+        model = onboard(frames, backend, config.view, config.cloud, labels, symmetry)
         model.save(self.out)
         if plate is not None:
             write_concept_plate(plate, model, backend)
@@ -117,6 +123,7 @@ def _verdict(model: ConceptModel, path: Path) -> Table:
     table.add_row("surface points", str(quality["points"]))
     table.add_row("viewing sphere", f"{quality['coverage']:.0%} within 60 degrees of a reference view")
     table.add_row("seen twice", f"{quality['shared']:.0%} of the points, agreeing to {quality['agreement']:.2f}")
+    table.add_row("symmetry", str(model.symmetry))
     table.add_row("missing", "\n".join(quality["problems"]) or "nothing")
     return table
 

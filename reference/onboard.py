@@ -12,6 +12,7 @@ from reference.cross_check import cross_check, others_than
 from reference.fusion import DEPTH_SLACK, diameter_of, fuse
 from reference.keyframes import choose_reference_frames
 from reference.quality import judge
+from reference.symmetry_detection import detect_symmetry
 from tracker.cloud import LEAST_POINTS, CloudConfig, inliers, lift
 from tracker.concept import ConceptModel
 from tracker.errors import OnboardingError
@@ -19,6 +20,7 @@ from tracker.frame import PosedFrame
 from tracker.geometry import Floats
 from tracker.saliency import Query, SaliencyBackend
 from tracker.sources import PosedSource, Sighting
+from tracker.symmetry import Symmetry
 from tracker.view import ViewConfig, bounding_box, view_object
 
 logger = logging.getLogger(__name__)
@@ -35,10 +37,12 @@ def onboard(
     view_config: ViewConfig | None = None,
     cloud_config: CloudConfig | None = None,
     vocabulary: Sequence[str] | None = None,
+    symmetry: Symmetry | None = None,
 ) -> ConceptModel:
     """One concept model from frames with known poses and masks of one object. Its frame is that of the poses.
 
-    vocabulary: the concepts that it is to hold, None for the backend's own choice.
+    vocabulary: the concepts that it is to hold, None for the backend's own choice. symmetry: of the object, in
+    the coordinates of the poses, None to detect it.
 
     Raises OnboardingError where a frame has no usable points or the frames together do not make a model.
     """
@@ -76,7 +80,8 @@ def onboard(
     for problem in quality.problems:
         logger.warning("model of object %r: %s", model.object_id, problem)
     verdict = {**asdict(quality), "problems": list(quality.problems)}
-    return replace(model, notes={**model.notes, "quality": verdict})
+    symmetry = detect_symmetry(model) if symmetry is None else symmetry
+    return replace(model, notes={**model.notes, "quality": verdict}, symmetry=symmetry)
 
 
 def _posed(source: PosedSource, object_id: str, sighting: Sighting) -> PosedFrame:

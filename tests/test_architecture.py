@@ -27,13 +27,14 @@ FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("
 ORDER = {
     "tracker": (
         "errors", "geometry", "frame", "sources", "view", "saliency", "cloud", "region", "reference_views",
-        "grounding", "concept", "measures", "matching", "appearance", "projection", "least_squares",
-        "closest_points", "umeyama", "hypotheses", "registration", "verification", "refinement", "pose_filter",
-        "config", "result", "stopwatch", "pipeline", "output", "viewer", "terminal", "__main__",
+        "grounding", "symmetry", "declared_symmetry", "concept", "measures", "matching", "appearance",
+        "projection", "least_squares", "closest_points", "umeyama", "hypotheses", "registration",
+        "verification", "refinement", "pose_filter", "config", "result", "stopwatch", "pipeline", "output",
+        "viewer", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
-        "quality", "onboard", "plate", "__main__",
+        "quality", "self_alignment", "symmetry_detection", "onboard", "plate", "__main__",
     ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}

@@ -19,6 +19,7 @@ import tracker.sources
 from eval.bop_results import read_results
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig, read_config
+from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import SourceError
 from tracker.frame import Frame
 from tracker.sources.synthetic import open_scene
@@ -164,6 +165,17 @@ def test_reference_writes_a_model_and_says_what_it_is_worth(model: Path, run: Ru
     assert (tmp_path / "new" / "box.concept").read_bytes() == model.read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("declared", "told"), [("z:inf", "any turn about"), ("x:180,y:180", "4 turns"), ("none", "none")]
+)
+def test_reference_takes_a_declared_symmetry_and_shows_it(declared: str, told: str, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "a.concept"
+    said = run("reference", SOURCE, "--object", BOX, "--views", 2, "--out", path, "--symmetry", declared)
+    assert said.code == 0
+    assert told in next(line for line in said.err.splitlines() if "symmetry" in line)
+    assert ConceptModel.load(path).symmetry.packed() == parse_symmetry(declared).packed()
+
+
 def test_reference_overwrites_only_when_it_is_told_to(model: Path, run: Run, tmp_path: Path) -> None:
     path = tmp_path / "box.concept"
     path.write_text("precious")
@@ -180,6 +192,7 @@ def test_reference_overwrites_only_when_it_is_told_to(model: Path, run: Run, tmp
         (SOURCE, ("--object", "spoon"), ("'spoon'", BOX)),
         (SOURCE, ("--object", BOX, "--backend", "tea"), ("'tea'", "attributes")),
         (SOURCE, ("--object", BOX, "--views", "0"), ("--views", "0")),
+        (SOURCE, ("--object", BOX, "--symmetry", "round"), ("'round'", "AXIS:ANGLE", "x:180,y:180")),
         ("synthetic:kitchen", ("--object", BOX), ("'kitchen'", "tabletop", "leave")),
         ("webcam:0", ("--object", BOX), ("webcam:0", "bop", "folder", "synthetic")),
         ("synthetic:turn?size=64x64&object=mug&frames=2", ("--object", "mug"), ("none of 2 frames", "pixels")),

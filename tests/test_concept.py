@@ -14,8 +14,12 @@ import pytest
 import safetensors.numpy
 
 from tracker.concept import ARRAYS, FORMAT_VERSION, ConceptModel
+from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import ModelError, OutputError
 from tracker.saliency import SaliencyBackend
+from tracker.symmetry import NO_SYMMETRY
+
+SYMMETRY = NO_SYMMETRY.packed()
 
 
 def model(points: int = 60, labels: tuple[str, ...] = ("red", "flat", "grün"), seed: int = 0) -> ConceptModel:
@@ -34,6 +38,7 @@ def model(points: int = 60, labels: tuple[str, ...] = ("red", "flat", "grün"), 
         backend="attributes",
         fingerprint="attributes-0123456789ab",
         notes={"reference_frames": ["bop:x:1 image 5"], "quality": {"coverage": 1 / 3, "problems": []}},
+        symmetry=parse_symmetry("0.1/0.2/0.3:inf,0.2/-0.1/0:180", np.array([0.1, 1 / 3, 0])),
     )
 
 
@@ -42,8 +47,12 @@ def same(a: ConceptModel, b: ConceptModel) -> bool:
         np.array_equal(getattr(a, name), getattr(b, name)) and getattr(a, name).dtype == getattr(b, name).dtype
         for name in ARRAYS
     )
-    others = [name for name in ConceptModel.__slots__ if name not in (*ARRAYS, "references")]
-    return arrays and all(getattr(a, name) == getattr(b, name) for name in others)
+    others = [name for name in ConceptModel.__slots__ if name not in (*ARRAYS, "references", "symmetry")]
+    return (
+        arrays
+        and a.symmetry.packed() == b.symmetry.packed()
+        and all(getattr(a, name) == getattr(b, name) for name in others)
+    )
 
 
 def rewritten(path: Path, **header: Any) -> Path:
@@ -136,6 +145,16 @@ def test_a_model_of_another_version_is_refused_with_both_versions_and_what_to_do
         ({"backend": None}, "header's backend"),
         ({"fingerprint": None}, "header's fingerprint"),
         ({"notes": []}, "header's notes"),
+        ({"symmetry": None}, "header's symmetry is None, expected a dict"),
+        ({"symmetry": {}}, "a symmetry has turns, origin_m and axis: KeyError"),
+        ({"symmetry": SYMMETRY | {"turns": "all"}}, "a symmetry has turns, origin_m and axis: ValueError"),
+        ({"symmetry": SYMMETRY | {"turns": []}}, r"1 to 360 turns of 3x3, got shape \(0,\)"),
+        ({"symmetry": SYMMETRY | {"turns": [np.eye(3).tolist()] * 361}}, "1 to 360 turns"),
+        ({"symmetry": SYMMETRY | {"turns": [np.diag([-1, -1, 1]).tolist()]}}, "rotations, the identity first"),
+        ({"symmetry": SYMMETRY | {"turns": [np.eye(3).tolist(), np.diag([1, 1, -1]).tolist()]}}, "are rotations"),
+        ({"symmetry": SYMMETRY | {"turns": [[[float("nan")] * 3] * 3]}}, "are rotations"),
+        ({"symmetry": SYMMETRY | {"origin_m": [0, 0]}}, "origin_m is three finite numbers"),
+        ({"symmetry": SYMMETRY | {"axis": [0, 0, 2]}}, "axis is a unit vector or null"),
         ({"diameter_m": "wide"}, "header's diameter_m is 'wide', expected a float"),
         ({"diameter_m": 0.0}, r"header's diameter_m is 0\.0, expected a length"),
         ({"diameter_m": float("nan")}, "header's diameter_m is nan, expected a length"),

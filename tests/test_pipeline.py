@@ -4,20 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
 from reference.onboard import onboard, read_reference_frames
+from tracker.appearance import ViewAppearance
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
+from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import ConfigError, FrameError, ModelError
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
 from tracker.pipeline import ObjectTracker
+from tracker.registration import Candidate, register
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources.synthetic import SyntheticScene, open_scene
+from tracker.verification import Evidence, Verifier
+from tracker.view import ObjectView
 
 CAN = "soup_can"
 WITHOUT_PRIOR = TrackerConfig(prior=False)
@@ -295,3 +302,58 @@ def test_a_model_of_another_backend_is_refused_with_what_to_do(
 def test_a_model_of_a_backend_that_does_not_exist_is_refused(can_model: ConceptModel) -> None:
     with pytest.raises(ConfigError, match="no saliency backend 'tea leaves'; expected one of attributes"):
         ObjectTracker(replace(can_model, backend="tea leaves"))
+
+
+def test_a_bowl_that_turns_before_the_camera_does_not_jump_between_its_equivalents(attributes: SaliencyBackend) -> None:
+    """Between frames the pose turns as far as the bowl did, about its axis as far as it likes, and little farther."""
+    scene = open_scene("turn?size=320x240&object=bowl")
+    model = onboard(read_reference_frames(scene, "bowl", 2), attributes)
+    frames = [scene[index] for index in range(20, 32)]
+    results = tracked(model, frames)
+    truths = [scene.sightings("bowl")[frame.index].T_cam_obj for frame in frames]
+    any_turn = parse_symmetry("z:inf")
+    for (before, after), (was, is_now) in zip(pairwise(results), pairwise(truths), strict=True):
+        assert before.pose is not None
+        assert after.pose is not None
+        assert after.raw_pose is not None
+        for pose in (after.pose, after.raw_pose):
+            assert np.degrees(before.pose.angle_to_rad(pose) - was.angle_to_rad(is_now)) < 10
+            millimetres, degrees = errors(any_turn.nearest(pose, is_now), is_now)
+            assert millimetres < 3
+            assert degrees < 4
+
+
+def test_of_poses_that_a_symmetry_makes_one_the_nearest_to_the_prediction_is_reported(
+    can_scene: SyntheticScene, can_model: ConceptModel, can_frames: list[Frame]
+) -> None:
+    """Whatever it is said to be: told that a can may be turned by any angle, it never turns it without need."""
+    results = tracked(replace(can_model, symmetry=parse_symmetry("z:inf")), can_frames)
+    truth = [can_scene.sightings(CAN)[frame.index].T_cam_obj for frame in can_frames]
+    told = [result.pose for result in results if result.pose]
+    assert len(told) == len(can_frames)
+    needed = parse_symmetry("z:inf").nearest(truth[-1], truth[0]).angle_to_rad(truth[0])
+    assert told[0].angle_to_rad(told[-1]) < needed + np.radians(3) < truth[0].angle_to_rad(truth[-1]) - np.radians(3)
+
+
+def test_candidates_that_a_symmetry_makes_one_are_verified_once(
+    can_model: ConceptModel, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verified: list[Pose] = []
+
+    def one_and_its_turns(*arguments: Any) -> list[Candidate]:
+        best = register(*arguments)[0]
+        return [replace(best, T_cam_obj=turned) for turned in parse_symmetry("z:60").equivalents(best.T_cam_obj)]
+
+    def verify(self: Verifier, pose: Pose, view: ObjectView, appearance: ViewAppearance) -> Evidence:
+        verified.append(pose)
+        return usual(self, pose, view, appearance)
+
+    usual = Verifier.__call__
+    monkeypatch.setattr("tracker.pipeline.register", one_and_its_turns)
+    monkeypatch.setattr(Verifier, "__call__", verify)
+    for symmetry, distinct in (("none", 6), ("z:120", 2), ("z:60", 1), ("z:inf", 1)):
+        verified.clear()
+        config = TrackerConfig(prior=False, verified=1)
+        (result,) = tracked(replace(can_model, symmetry=parse_symmetry(symmetry)), can_frames[:1], config)
+        assert result.pose is not None
+        assert len(verified) == distinct + 1  # that one again, refined

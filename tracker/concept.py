@@ -23,6 +23,7 @@ from tracker.grounding import ground
 from tracker.reference_views import PARTS, packed, unpacked
 from tracker.region import Region, region_of
 from tracker.saliency import SaliencyBackend, open_backend
+from tracker.symmetry import NO_SYMMETRY, Symmetry
 from tracker.view import Float32s
 
 FORMAT_VERSION = 2
@@ -42,6 +43,7 @@ class ConceptModel:
     labels: the L concepts. backend, fingerprint: who measured them and with which settings.
     notes: how it came about (reference frames, quality), JSON-ready.
     references: the K reference views, empty outside the object's box, so that other concepts can be asked for later.
+    symmetry: the turns after which it looks the same.
     """
 
     object_id: str
@@ -58,6 +60,7 @@ class ConceptModel:
     fingerprint: str
     notes: dict[str, Any] = field(default_factory=dict)
     references: tuple[PosedFrame, ...] = ()
+    symmetry: Symmetry = NO_SYMMETRY
 
     def __len__(self) -> int:
         return len(self.points)
@@ -107,6 +110,7 @@ class ConceptModel:
             "fingerprint": self.fingerprint,
             "notes": self.notes,
             "references": view_headers,
+            "symmetry": self.symmetry.packed(),
         }
         arrays = {name: np.ascontiguousarray(getattr(self, name)) for name in ARRAYS} | views
         content = safetensors.numpy.save(arrays, metadata={"concept_model": json.dumps(header)})
@@ -132,6 +136,7 @@ class ConceptModel:
                 _check_header(path, header)
                 arrays = {name: file.get_tensor(name) for name in ARRAYS}
                 names = (f"view{k}.{part}" for k in range(len(header["references"])) for part in PARTS)
+                symmetry = Symmetry.unpacked(header["symmetry"])
                 views = unpacked({n: file.get_tensor(n) for n in names}, header["references"], header["object_id"])
         except (safetensors.SafetensorError, ValueError, OSError) as error:
             raise ModelError(f"{path}: not a whole concept model ({error})") from error
@@ -144,6 +149,7 @@ class ConceptModel:
             fingerprint=header["fingerprint"],
             notes=header["notes"],
             references=views,
+            symmetry=symmetry,
             **arrays,
         )
 
@@ -164,6 +170,7 @@ def _check_header(path: Path, header: dict[str, Any]) -> None:
         "fingerprint": str,
         "notes": dict,
         "references": list,
+        "symmetry": dict,
     }
     for key, kind in expected.items():
         if not isinstance(header.get(key), kind):

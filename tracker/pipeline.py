@@ -20,7 +20,7 @@ from tracker.geometry import Pose
 from tracker.matching import Correspondences, Matcher
 from tracker.pose_filter import PoseFilter
 from tracker.refinement import Refined, Refiner
-from tracker.registration import register
+from tracker.registration import Candidate, register
 from tracker.result import Surface, TrackResult, TrackState
 from tracker.saliency import Query, Saliency, SaliencyBackend, open_backend
 from tracker.stopwatch import Stopwatch
@@ -181,6 +181,7 @@ class _Track:
         with clock("registration"):
             generator = torch.Generator(self._device).manual_seed(self._config.seed)
             candidates = register(correspondences, sight.cloud, self._model, self._config.registration, generator)
+            candidates = self._inequivalent(candidates)
         with clock("verification"):
             rough = [(self._verify(c.T_cam_obj, sight.view, sight.appearance).score, c) for c in candidates]
             rough.sort(key=lambda scored: -scored[0])
@@ -190,6 +191,12 @@ class _Track:
                 closer = self._closest.align(candidate.T_cam_obj, sight.cloud)
             best = _better(best, self._refined(closer, sight, "search", clock))
         return best
+
+    def _inequivalent(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Those that the object's symmetry does not make the same as a better supported one."""
+        alike = self._config.registration
+        poses, distance_m = [c.T_cam_obj for c in candidates], alike.distinct_share * self._model.diameter_m
+        return [candidates[k] for k in self._model.symmetry.distinct(poses, alike.distinct_rad, distance_m)]
 
     def _refined(self, T_start: Pose | None, sight: _Sight, origin: str, clock: Stopwatch) -> _Hypothesis | None:
         if T_start is None:
@@ -202,8 +209,10 @@ class _Track:
             return _Hypothesis(refined, self._verify(refined.T_cam_obj, sight.view, sight.appearance), origin)
 
     def _tracked(self, frame: Frame, found: _Hypothesis, view: ObjectView, clock: Stopwatch) -> TrackResult:
-        raw, information = found.refined.T_cam_obj, found.refined.information
         with clock("filter"):
+            predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
+            refined = found.refined if predicted is None else found.refined.nearest(predicted, self._model.symmetry)
+            raw, information = refined.T_cam_obj, refined.information
             filtered = self._filter.update(raw, information, frame.stamp_ns) if self._config.prior else None
             if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
                 filtered = self._filter.start(raw, information, frame.stamp_ns)

@@ -63,6 +63,8 @@ def _unpacked(parts: list[npt.NDArray], header: Any, object_id: str) -> PosedFra
         depth_m[place] = parts[1] * np.float32(header["depth_unit_m"])
         provenance = Provenance(str(header["source"]), raw_depth_unit_m=header["depth_unit_m"])
         frame = Frame(rgb, depth_m, camera, 0, {object_id: mask}, int(header["index"]), provenance)
-        return PosedFrame(frame, object_id, Pose.from_matrix(header["T_cam_obj"]), mask)
+        T_cam_obj = np.array(header["T_cam_obj"], np.float64)
+        Pose.from_matrix(T_cam_obj)  # refuses what is none; what it returns is rounded anew, and a saved pose stays
+        return PosedFrame(frame, object_id, Pose(T_cam_obj[:3, :3], T_cam_obj[:3, 3]), mask)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, TrackerError) as error:
         raise ValueError(f"a reference view is damaged: {error}") from error

@@ -6,7 +6,7 @@ slide along its face. Gauss-Newton on the picture's own gradients, smoothed firs
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -16,6 +16,7 @@ from tracker.concept import ConceptModel
 from tracker.geometry import Floats, Pose
 from tracker.least_squares import MotionEquations, moved, tukey
 from tracker.projection import interpolate, nearest_pixels, project
+from tracker.symmetry import Symmetry
 from tracker.view import ObjectView
 
 LEAST_POINTS = 20  # fewer do not carry six degrees of freedom
@@ -52,6 +53,16 @@ class Refined:
     information: Floats
     residual_m: float
     aligned: int
+
+    def nearest(self, to: Pose, symmetry: Symmetry) -> Refined:
+        """The same result at the equivalent pose nearest to another one."""
+        pose = symmetry.nearest(self.T_cam_obj, to)
+        if pose is self.T_cam_obj:
+            return self
+        # A turn w and a shift v about the new origin are, about the old one at d from it, w and v + w x d.
+        d_m, carried = self.T_cam_obj.translation_m - pose.translation_m, np.eye(6)
+        carried[3:, :3] = np.cross(np.eye(3), d_m).T
+        return replace(self, T_cam_obj=pose, information=carried.T @ self.information @ carried)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
