@@ -61,6 +61,8 @@ class Track:
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
+        if not self.model:
+            raise ConfigError("--model: at least one concept model is needed; python -m reference makes one")
         models = [ConceptModel.load(path) for path in self.model]
         backend = open_backend(models[0].backend, BackendOptions(self.weights, self.device))
         tracker = ObjectTracker(models, config, backend)

@@ -23,6 +23,9 @@ from types import TracebackType
 import torch
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
+# Gradients of a cosine, spread over hundreds of places, vanish in half precision; maps do not depend on their scale.
+HALF_PRECISION_SCALE = 1024.0
+
 Explained = Callable[[], torch.Tensor]
 Output = torch.Tensor | tuple[torch.Tensor, ...]
 ToGrid = Callable[[torch.Tensor], torch.Tensor]
@@ -77,7 +80,7 @@ class GradCam:
             scores = explained()
             if self._tokens is None or self._leaf is None:
                 raise RuntimeError("the layer that is to be explained did not run")
-            one_each = torch.eye(scores.shape[1], dtype=scores.dtype, device=scores.device)
+            one_each = HALF_PRECISION_SCALE * torch.eye(scores.shape[1], dtype=scores.dtype, device=scores.device)
             # pictures do not meet in the network, so the sum over them keeps their gradients apart
             (gradients,) = torch.autograd.grad(scores.sum(dim=0), self._leaf, one_each, is_grads_batched=True)
         with torch.no_grad():

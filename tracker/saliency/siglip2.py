@@ -74,8 +74,8 @@ def _before_pooling(gradients: torch.Tensor, pooling: torch.nn.MultiheadAttentio
     to V^T g as the a_t sum to one, and a part through a, which sums to nothing as the a_t can only grow at one
     another's expense. So of the tokens' gradients, the dearest part of GradCAM here, none is needed.
     """
-    value = pooling.in_proj_weight[2 * pooling.embed_dim :]
-    return gradients[:, :, 0] @ pooling.out_proj.weight @ value / places
+    value = pooling.in_proj_weight[2 * pooling.embed_dim :].float()
+    return gradients[:, :, 0].float() @ pooling.out_proj.weight.float() @ value / places
 
 
 def square(tokens: torch.Tensor) -> torch.Tensor:
