@@ -31,7 +31,7 @@ def speckled(seed: int = 0) -> tuple[Frame, Mask]:
 
 
 def viewed(frame: Frame, mask: Mask, extent_m: float, pixels_across: int = 64) -> ObjectView:
-    view = view_object(frame, mask, extent_m, ViewConfig(pixels_across=pixels_across))
+    view = view_object(frame, mask, extent_m, ViewConfig(pixels_across=pixels_across, least_pixels=0))
     assert view is not None
     return view
 
@@ -213,6 +213,17 @@ def test_an_object_in_the_corner_is_viewed_with_a_margin_beyond_the_frame() -> N
     assert (view.box.y0, view.box.x0) == (-12, 118)
     assert view.box.x1 > 160
     assert view.inside.sum() == pytest.approx(20 * 30 / 9, rel=0.1)
+
+
+@pytest.mark.parametrize(("least_pixels", "block"), [(0, 6), (100, 3), (400, 1), (100_000, 1)])
+def test_an_object_of_which_little_shows_is_viewed_more_finely(least_pixels: int, block: int) -> None:
+    frame, _ = speckled()
+    mask = np.zeros((120, 160), bool)
+    mask[40:70, 60:90] = True  # 900 pixels, 25 of the nominal ones
+    view = view_object(frame, mask, 0.96, ViewConfig(least_pixels=least_pixels))
+    assert view is not None
+    assert (view.box.x1 - view.box.x0) / view.camera.width == block
+    assert view.inside.sum() >= min(least_pixels, 900)
 
 
 def test_there_is_no_view_of_nothing_nor_of_what_has_no_depth() -> None:

@@ -1,0 +1,65 @@
+"""The benchmarks run, small, and say what they are to say; no test looks at a clock."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from eval.bench.methods import THRESHOLD_M, open3d_fgr, open3d_ransac, ours, peers
+from eval.bench.problems import problem
+from eval.bench.registration import RegistrationBench
+from eval.bench.saliency import SaliencyBench
+from tests.tiny_networks import save_siglip
+from tracker.errors import OutputError
+from tracker.geometry import Pose
+
+
+def test_a_problem_s_right_pairs_meet_at_its_pose() -> None:
+    given = problem(0, 2000, 0.7)
+    apart = ((given.T_cam_obj @ given.points_obj - given.points_cam) ** 2).sum(axis=1) ** 0.5
+    assert (apart < THRESHOLD_M).mean() == pytest.approx(0.3, abs=0.05)
+    assert given.errors(given.T_cam_obj) == pytest.approx((0, 0), abs=1e-6)
+    assert given.errors(None) == (float("inf"), float("inf"))
+    assert given.errors(Pose.identity())[1] > 0.5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_method_solves_an_easy_problem(seed: int) -> None:
+    given = problem(seed, 800, 0.3)
+    for method in (ours(0.999), ours(1.0, 5000), open3d_ransac(0.999), open3d_fgr(), *peers().values()):
+        degrees, metres = given.errors(method(given, seed))
+        assert degrees < 5
+        assert metres < 0.01
+
+
+def test_the_registration_bench_says_everything_that_it_is_asked_for(tmp_path: Path) -> None:
+    bench = RegistrationBench(correspondences=300, seeds=2, open3d_seeds=1, json=tmp_path / "deep" / "figures.json")
+    bench()
+    figures = json.loads((tmp_path / "deep" / "figures.json").read_text())
+    assert figures["success"]["0.9"] == 1
+    assert set(figures["success"]) == {"0.9", "0.95", "0.98"}
+    assert figures["speedup_over_open3d_ransac"] > 0
+    assert figures["global_pose"]["degrees"] < 2
+    assert figures["global_pose"]["mm"] < 2
+    assert figures["refinement"]["degrees"] < 0.5
+    assert figures["global_pose_ms"] > 0
+    assert figures["refinement_ms"] > 0
+    assert set(figures["early_stop"]) == {"0.5", "0.9", "0.95"}
+    assert figures["environment"]["torch"]
+    with pytest.raises(OutputError, match=r"figures\.json exists"):
+        bench()
+
+
+def test_the_saliency_bench_says_everything_that_it_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    weights = str(save_siglip(tmp_path / "weights"))
+    SaliencyBench(weights=weights, labels=4, repeat=1, device="cpu", json=tmp_path / "figures.json")()
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert {"ratio_to_forward", "speedup_over_loop", "speedup_over_grad_cam", "parameters_mb"} <= set(figures)
+    assert figures["speedup_over_loop"] > 0
+    assert figures["speedup_over_grad_cam"] is None
+    assert figures["weights"] == weights
