@@ -43,9 +43,10 @@ def project(points_obj: Floats, normals_obj: Floats, T_cam_obj: Pose, camera: In
     return Projection(points_cam, normals_cam, columns, rows, facing)
 
 
-def not_self_hidden(projection: Projection, diameter_m: float) -> Mask:
-    """(N,) bool: no point of the same object lies clearly in front. By a depth buffer of coarse cells."""
-    cells = np.stack((projection.rows, projection.columns), axis=1) // CELL_PX
+def not_self_hidden(projection: Projection, diameter_m: float, cell_px: float = CELL_PX) -> Mask:
+    """(N,) bool: no point of the same object lies clearly in front. By a depth buffer of cells so coarse that the
+    points of a surface leave none empty."""
+    cells = np.stack((projection.rows, projection.columns), axis=1) // cell_px
     cells = (cells - cells.min(axis=0)).astype(np.int64)
     cell = cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1]
     depth_m = projection.points_cam[:, 2]

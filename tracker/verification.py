@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
 from tracker.geometry import Pose
+from tracker.projection import CELL_PX as SELF_HIDDEN_PX
 from tracker.projection import nearest_pixels, not_self_hidden, project
 from tracker.view import ObjectView
 
@@ -48,14 +49,14 @@ class Evidence:
 
 
 NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-CELL_PX = 3  # the sampled points of a surface that lies there leave no cell of this size empty
+CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
 
 
 class Verifier:
     """Judges poses of one model. Each point counts by the cosine of its incidence: grazing surfaces prove little."""
 
     def __init__(self, model: ConceptModel, config: VerificationConfig, pixels_across: int) -> None:
-        self._config, self._diameter_m = config, model.diameter_m
+        self._config, self._diameter_m, self._pixels_across = config, model.diameter_m, pixels_across
         chosen = np.random.default_rng(0).permutation(len(model))[: config.model_points]
         self._points, self._normals = model.points[chosen], model.normals[chosen]
         self._lab = model_appearance(model, pixels_across).lab[0][chosen]
@@ -66,7 +67,8 @@ class Verifier:
         faces = (at.facing > 0.2) & (at.points_cam[:, 2] > 0)
         if not faces.any():
             return NOTHING_SEEN
-        faces &= not_self_hidden(at, self._diameter_m)
+        finer = max(1.0, view.pixels_across / self._pixels_across)  # than usual, where little of the object shows
+        faces &= not_self_hidden(at, self._diameter_m, SELF_HIDDEN_PX * finer)
         rows, columns = nearest_pixels(at, view.camera)
         on_object = at.within(view.camera, 0) & view.inside[rows, columns]
         measured_m = np.where(on_object, view.depth_m[rows, columns], _frame_depth_m(at.points_cam, view))
@@ -83,7 +85,7 @@ class Verifier:
         colour = self._colour_agreement(appearance.lab[0][rows, columns], in_place)
         colour_share = self._config.colour_share
         agreed = float((surface * (1 - colour_share + colour_share * colour)).sum() / total)
-        explained = _explained(rows[in_place], columns[in_place], view)
+        explained = _explained(rows[in_place], columns[in_place], view, round(CELL_PX * finer))
         return Evidence(
             score=agreed * explained**2 / (explained**2 + (1 - explained) ** 2),
             surface=float(surface.sum() / total),
@@ -104,14 +106,14 @@ class Verifier:
         return np.exp(-0.5 * (difference / self._config.lab_sigma) ** 2 - 0.5 * (drift / 25) ** 2)
 
 
-def _explained(rows: np.ndarray, columns: np.ndarray, view: ObjectView) -> float:
+def _explained(rows: np.ndarray, columns: np.ndarray, view: ObjectView, cell_px: int) -> float:
     """Share of the object's measured pixels in whose cell there is one of these pixels (N,)."""
     height, width = view.depth_m.shape
-    across = width // CELL_PX + 1
-    cells = (height // CELL_PX + 1) * across
+    across = width // cell_px + 1
+    cells = (height // cell_px + 1) * across
     measured = np.nonzero(view.has_depth)
-    area = np.bincount(measured[0] // CELL_PX * across + measured[1] // CELL_PX, minlength=cells)
-    met = np.bincount(rows // CELL_PX * across + columns // CELL_PX, minlength=cells) > 0
+    area = np.bincount(measured[0] // cell_px * across + measured[1] // cell_px, minlength=cells)
+    met = np.bincount(rows // cell_px * across + columns // cell_px, minlength=cells) > 0
     return float(area[met].sum() / max(area.sum(), 1))
 
 
