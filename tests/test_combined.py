@@ -67,9 +67,13 @@ def test_a_vocabulary_that_is_complete_stays_as_it_is(ball: ObjectView, attribut
     assert both([Query(ball, labels)])[0].maps.shape[0] == 1 + len(TERMS)
 
 
-def test_two_concepts_of_one_name_are_refused(attributes: SaliencyBackend) -> None:
-    with pytest.raises(ConfigError, match="'red'"):
-        Combined([(Halves(), 1.0), (attributes, 1.0)]).labels_for(["left", "Red"])
+def test_of_two_concepts_of_one_name_the_measured_one_is_kept(ball: ObjectView, attributes: SaliencyBackend) -> None:
+    both = Combined([(Halves(), 1.0), (attributes, 1.0)])
+    labels = both.labels_for(["left", "Red", "rim"])
+    assert labels == ("left", *TERMS)
+    (alone,) = attributes([Query(ball, ("red",))])
+    (saliency,) = both([Query(ball, labels)])
+    assert np.allclose(saliency.maps[labels.index("red")], alone.maps[0], atol=1e-5)
 
 
 def test_the_name_and_the_fingerprint_tell_weights_apart(attributes: SaliencyBackend) -> None:

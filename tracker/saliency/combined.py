@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.errors import ConfigError
 from tracker.saliency import Query, Saliency, SaliencyBackend, fingerprint_of
 from tracker.view import Float32s
 
@@ -15,7 +14,7 @@ class Combined:
     """Concept vectors of its parts one after the other, each part's saliency times its weight.
 
     parts: backends with their weights in (0, 1]. The first is asked for the vocabulary, the others for their own
-    concepts. Raises ConfigError where two parts have a concept of the same name.
+    concepts; of two concepts of one name the later part's is kept, as it is the measured one.
     """
 
     def __init__(self, parts: Sequence[tuple[SaliencyBackend, float]]) -> None:
@@ -31,12 +30,8 @@ class Combined:
         others = tuple(label for own in self._own for label in own)
         if wanted is not None and len(wanted) > len(others) and tuple(wanted[-len(others) :]) == others:
             return tuple(wanted)
-        labels = first.labels_for(wanted)
-        if twice := sorted({label.casefold() for label in labels} & {label.casefold() for label in others}):
-            raise ConfigError(
-                f"{self.name}: two of its parts have a concept {twice[0]!r}: leave it out of the vocabulary"
-            )
-        return labels + others
+        measured = {label.casefold() for label in others}
+        return tuple(label for label in first.labels_for(wanted) if label.casefold() not in measured) + others
 
     def __call__(self, queries: Sequence[Query]) -> list[Saliency]:
         cuts = [self._cuts(query.labels) for query in queries]
