@@ -24,6 +24,7 @@ from reference.vocabulary import (
     write_vocabulary,
 )
 from tracker.errors import ConfigError, OutputError
+from tracker.saliency.vision_language import GENERAL_LABELS
 
 MUG = Vocabulary("mug", ("handle", "rim"), ids=("14", "025_mug"))
 BOWL = Vocabulary("bowl", ("rim", "foot"), ids=("13", "024_bowl"))
@@ -278,3 +279,8 @@ def test_a_file_that_is_cut_off_anywhere_is_read_to_a_vocabulary_or_an_error(fil
             complaints.append(str(error))
     assert len(complaints) > len(HEADER) // 3
     assert all(complaint.startswith(str(file)) for complaint in complaints)
+
+
+def test_the_general_vocabulary_is_what_language_backends_take_when_nobody_says_anything() -> None:
+    (general,) = read_vocabulary("general").vocabularies
+    assert general.labels == GENERAL_LABELS

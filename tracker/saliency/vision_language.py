@@ -18,8 +18,8 @@ from tracker.saliency.text_cache import TextCache
 from tracker.view import Box, Float32s, bounding_box
 
 GENERAL_LABELS = (
-    "handle", "rim", "lid", "label", "body", "base", "neck", "spout", "opening", "corner", "edge", "logo", "text",
-    "button", "hole", "blade", "tip", "stripe", "side", "inside",
+    "handle", "rim", "lid", "label", "spout", "base", "body", "logo", "printed text", "barcode", "button",
+    "screen", "seam", "hole", "corner", "neck", "knob", "cord", "metal part", "rubber grip",
 )  # fmt: skip
 CROPS_KEPT = 64
 
