@@ -164,7 +164,7 @@ def test_colour_tells_the_can_from_the_can_turned_about_its_axis(
     assert wrong.surface > 0.7 * right.surface
     assert wrong.colour < 0.85 * right.colour
     shape_alone = VerificationConfig(colour_share=0)
-    assert judged(can_model, around, can_view, shape_alone).score == pytest.approx(wrong.surface, rel=0.02)
+    assert judged(can_model, around, can_view, shape_alone).score == pytest.approx(wrong.surface, rel=0.06)
     assert wrong.score < 0.9 * right.score
 
 

@@ -24,7 +24,9 @@ from tracker.view import ViewConfig
 class TrackerConfig(BaseModel):
     """prior: start from the predicted pose and search globally only where that fails; False makes every frame
     independent, as in the paper. accept: confidence under which no pose is reported. trust: confidence at which a
-    pose found from the prediction is taken without a global search. verified: candidates that are refined.
+    pose found from the prediction is taken without a global search. jump: by how much a pose found
+    elsewhere has to be better than that: objects seldom jump, and may show a side that the model does not know.
+    verified: candidates that are refined.
     seed: of the sampling. device: of matching and registration, "auto" is CUDA where there is one."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -32,6 +34,7 @@ class TrackerConfig(BaseModel):
     prior: bool = True
     accept: float = Field(default=0.25, ge=0, le=1)
     trust: float = Field(default=0.6, ge=0, le=1)
+    jump: float = Field(default=0.1, ge=0, le=1)
     verified: int = Field(default=5, ge=1, le=64)
     seed: int = 42
     device: str = "auto"

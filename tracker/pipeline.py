@@ -149,7 +149,10 @@ class _Track:
         # 3. Is it where it was expected? If not clearly so: where do the correspondences agree that it is?
         found = self._expected(frame, sight, correspondences, clock)
         if found is None or found.evidence.score < self._config.trust:
-            found = _better(found, self._searched(sight, correspondences, clock))
+            held = found if found is not None and found.evidence.score >= self._config.accept else None
+            elsewhere = self._searched(sight, correspondences, clock)
+            if held is None or (elsewhere and elsewhere.evidence.score > held.evidence.score + self._config.jump):
+                found = _better(elsewhere, None if held else found)
         if found is None or found.evidence.score < self._config.accept:
             score = found.evidence.score if found else 0.0
             return self._lost(frame, f"poor fit: the best pose explains {score:.2f} of what should be seen", clock)

@@ -31,9 +31,9 @@ class VerificationConfig(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour, times
-    e^2 / (e^2 + (1 - e)^2) with e = `explained`: a model need not know all that is seen, but where it knows
-    next to nothing it has proved nothing.
+    """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour, times what
+    `explained` makes it worth: a model need not know all that is seen, but where it knows next to nothing it has proved
+    nothing.
     surface: the same in place alone. colour: agreement of the colours where the place agrees.
     seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
     outside the mask. hidden: share of the camera-facing model that something in front hides. explained: share of the
@@ -49,6 +49,7 @@ class Evidence:
 
 
 NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+UNKNOWN, LEAST_EXPLAINED = 0.5, 0.3
 CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
 
 
@@ -87,7 +88,7 @@ class Verifier:
         agreed = float((surface * (1 - colour_share + colour_share * colour)).sum() / total)
         explained = _explained(rows[in_place], columns[in_place], view, round(CELL_PX * finer))
         return Evidence(
-            score=agreed * explained**2 / (explained**2 + (1 - explained) ** 2),
+            score=agreed * _worth(explained),
             surface=float(surface.sum() / total),
             colour=float((surface * colour).sum() / max(surface.sum(), 1e-9)),
             seen_through=float((weights * (on_object & (behind_m > reach_m))).sum() / total),
@@ -104,6 +105,13 @@ class Verifier:
         difference = np.linalg.norm((lab - self._lab - offset) * (0.6, 1, 1), axis=1)
         drift = np.linalg.norm(offset * (0.3, 1, 1))
         return np.exp(-0.5 * (difference / self._config.lab_sigma) ** 2 - 0.5 * (drift / 25) ** 2)
+
+
+def _worth(explained: float) -> float:
+    """In [0, 1]. What a model does not know counts half of what it gets wrong, so that the true pose of an object that
+    shows an unknown side is not beaten by a wrong one that shows a known side; under a third explained, worth falls
+    with the square."""
+    return explained / (explained + UNKNOWN * (1 - explained)) * min(1.0, explained / LEAST_EXPLAINED) ** 2
 
 
 def _explained(rows: np.ndarray, columns: np.ndarray, view: ObjectView, cell_px: int) -> float:
