@@ -24,10 +24,9 @@ from tracker.view import ViewConfig
 class TrackerConfig(BaseModel):
     """prior: start from the predicted pose and search globally only where that fails; False makes every frame
     independent, as in the paper. accept: confidence under which no pose is reported. trust: confidence at which a
-    pose found from the prediction is taken without a global search. jump: by how much a pose found
-    elsewhere has to be better than that: objects seldom jump, and may show a side that the model does not know.
-    verified: candidates that are refined.
-    seed: of the sampling. device: of matching and registration, "auto" is CUDA where there is one."""
+    pose found from the prediction is taken without a global search. jump: by how much a pose found elsewhere has to be
+    better than that: objects seldom jump, and may show a side that the model does not know. verified: candidates that
+    are refined. seed: of the sampling. device: of matching and registration, "auto" is CUDA where there is one."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

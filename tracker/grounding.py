@@ -28,7 +28,7 @@ def ground(
     seen = [(view_object(v.frame, v.mask, diameter_m, ViewConfig()), v.T_cam_obj.inverse()) for v in views]
     shown = [(view, T_obj_cam) for view, T_obj_cam in seen if view is not None]
     maps = backend([Query(view, labels) for view, _ in shown])
-    place = labels.index(label)
+    place = [known.casefold() for known in labels].index(label.casefold())  # a joined backend has its own spelling
     clouds = [
         (T_obj_cam @ cloud.points, cloud.saliency[:, place])
         for cloud, (_, T_obj_cam) in zip(

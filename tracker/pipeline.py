@@ -149,10 +149,7 @@ class _Track:
         # 3. Is it where it was expected? If not clearly so: where do the correspondences agree that it is?
         found = self._expected(frame, sight, correspondences, clock)
         if found is None or found.evidence.score < self._config.trust:
-            held = found if found is not None and found.evidence.score >= self._config.accept else None
-            elsewhere = self._searched(sight, correspondences, clock)
-            if held is None or (elsewhere and elsewhere.evidence.score > held.evidence.score + self._config.jump):
-                found = _better(elsewhere, None if held else found)
+            found = _preferred(found, self._searched(sight, correspondences, clock), self._config)
         if found is None or found.evidence.score < self._config.accept:
             score = found.evidence.score if found else 0.0
             return self._lost(frame, f"poor fit: the best pose explains {score:.2f} of what should be seen", clock)
@@ -250,6 +247,15 @@ class _Track:
             evidence=None,
             timings_ms=clock.timings_ms(),
         )
+
+
+def _preferred(
+    expected: _Hypothesis | None, elsewhere: _Hypothesis | None, config: TrackerConfig
+) -> _Hypothesis | None:
+    """The expected pose, unless it is not acceptable or the one found elsewhere is clearly better."""
+    if expected is None or elsewhere is None or expected.evidence.score < config.accept:
+        return _better(expected, elsewhere)
+    return elsewhere if elsewhere.evidence.score > expected.evidence.score + config.jump else expected
 
 
 def _better(a: _Hypothesis | None, b: _Hypothesis | None) -> _Hypothesis | None:
