@@ -76,6 +76,18 @@ def test_of_two_concepts_of_one_name_the_measured_one_is_kept(ball: ObjectView, 
     assert np.allclose(saliency.maps[labels.index("red")], alone.maps[0], atol=1e-5)
 
 
+def test_a_part_of_which_nothing_is_wanted_is_not_asked(ball: ObjectView, attributes: SaliencyBackend) -> None:
+    class Mute(Halves):
+        def __call__(self, queries: Sequence[Query]) -> list[Saliency]:
+            assert all(query.labels for query in queries)
+            return super().__call__(queries)
+
+    both = Combined([(Mute(), 1.0), (attributes, 1.0)])
+    several = both([Query(ball, both.labels_for(["Red"])), Query(ball, both.labels_for(["left"]))])
+    assert [one.maps.shape[0] for one in several] == [len(TERMS), 1 + len(TERMS)]
+    assert several[0].labels == TERMS
+
+
 def test_the_name_and_the_fingerprint_tell_weights_apart(attributes: SaliencyBackend) -> None:
     full, half = (Combined([(Halves(), 1.0), (attributes, w)]) for w in (1.0, 0.5))
     assert (full.name, half.name) == ("halves+attributes", "halves+attributes*0.5")

@@ -18,12 +18,13 @@ from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import ConfigError, FrameError, ModelError
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
-from tracker.pipeline import ObjectTracker
+from tracker.pipeline import ObjectTracker, _Hypothesis, _preferred
+from tracker.refinement import Refined
 from tracker.registration import Candidate, register
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources.synthetic import SyntheticScene, open_scene
-from tracker.verification import Evidence, Verifier
+from tracker.verification import NOTHING_SEEN, Evidence, Verifier
 from tracker.view import ObjectView
 
 CAN = "soup_can"
@@ -357,3 +358,29 @@ def test_candidates_that_a_symmetry_makes_one_are_verified_once(
         (result,) = tracked(replace(can_model, symmetry=parse_symmetry(symmetry)), can_frames[:1], config)
         assert result.pose is not None
         assert len(verified) == distinct + 1  # that one again, refined
+
+
+@pytest.mark.parametrize(
+    ("expected", "elsewhere", "chosen"),
+    [
+        (0.5, 0.55, "prediction"),  # hardly better: objects seldom jump
+        (0.5, 0.65, "search"),
+        (0.2, 0.22, "search"),  # the expected pose is not acceptable, so nothing speaks for it
+        (0.2, 0.15, "prediction"),
+        (None, 0.3, "search"),
+        (0.5, None, "prediction"),
+    ],
+)
+def test_a_pose_found_elsewhere_has_to_be_clearly_better(
+    expected: float | None, elsewhere: float | None, chosen: str
+) -> None:
+    def found(score: float | None, origin: str) -> _Hypothesis | None:
+        if score is None:
+            return None
+        refined = Refined(Pose.identity(), np.eye(6), 0.0, 100)
+        return _Hypothesis(refined, replace(NOTHING_SEEN, score=score), origin)
+
+    config = TrackerConfig(accept=0.25, jump=0.1)
+    best = _preferred(found(expected, "prediction"), found(elsewhere, "search"), config)
+    assert best is not None
+    assert best.origin == chosen

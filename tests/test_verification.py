@@ -14,7 +14,7 @@ from tracker.config import TrackerConfig
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.sources.synthetic import SyntheticScene
-from tracker.verification import Evidence, VerificationConfig, Verifier
+from tracker.verification import Evidence, VerificationConfig, Verifier, worth
 from tracker.view import ObjectView, ViewConfig, view_object
 
 CONFIG = VerificationConfig()
@@ -164,8 +164,10 @@ def test_colour_tells_the_can_from_the_can_turned_about_its_axis(
     assert wrong.surface > 0.7 * right.surface
     assert wrong.colour < 0.85 * right.colour
     shape_alone = VerificationConfig(colour_share=0)
-    assert judged(can_model, around, can_view, shape_alone).score == pytest.approx(wrong.surface, rel=0.06)
-    assert wrong.score < 0.9 * right.score
+    assert judged(can_model, around, can_view, shape_alone).score == pytest.approx(
+        wrong.surface * worth(wrong.explained)
+    )
+    assert wrong.score < 0.85 * right.score
 
 
 def test_exposure_and_white_balance_cost_little(
@@ -198,3 +200,22 @@ def test_every_share_lies_between_nothing_and_all(
         assert all(0 <= value <= 1 + 1e-9 for value in values)
         assert evidence.score <= evidence.surface
         assert evidence.surface + evidence.seen_through + evidence.outside <= 1 + 1e-9
+
+
+def test_a_pose_is_worth_more_the_more_it_explains_and_next_to_nothing_where_it_explains_little() -> None:
+    values = [worth(explained) for explained in np.linspace(0, 1, 21)]
+    assert values == sorted(values)
+    assert (values[0], values[-1]) == (0, 1)
+    assert worth(0.15) < 0.1
+    assert worth(0.5) > 0.5  # half of what is seen may be a side that the model does not know
+
+
+def test_a_finer_view_explains_as_much(can_model: ConceptModel, can_frames: list[Frame], can_truth: Pose) -> None:
+    """The model's points do not lie closer because the pixels do."""
+    frame = can_frames[0]
+    mask = frame.masks["soup_can"]
+    views = [
+        view_object(frame, mask, can_model.diameter_m, ViewConfig(pixels_across=n, least_pixels=0)) for n in (32, 64)
+    ]
+    coarse, fine = (Verifier(can_model, CONFIG, 32)(can_truth, v, view_appearance(v)) for v in views if v is not None)
+    assert fine.explained > 0.9 * coarse.explained > 0.8

@@ -88,7 +88,7 @@ class Verifier:
         agreed = float((surface * (1 - colour_share + colour_share * colour)).sum() / total)
         explained = _explained(rows[in_place], columns[in_place], view, round(CELL_PX * finer))
         return Evidence(
-            score=agreed * _worth(explained),
+            score=agreed * worth(explained),
             surface=float(surface.sum() / total),
             colour=float((surface * colour).sum() / max(surface.sum(), 1e-9)),
             seen_through=float((weights * (on_object & (behind_m > reach_m))).sum() / total),
@@ -107,7 +107,7 @@ class Verifier:
         return np.exp(-0.5 * (difference / self._config.lab_sigma) ** 2 - 0.5 * (drift / 25) ** 2)
 
 
-def _worth(explained: float) -> float:
+def worth(explained: float) -> float:
     """In [0, 1]. What a model does not know counts half of what it gets wrong, so that the true pose of an object that
     shows an unknown side is not beaten by a wrong one that shows a known side; under a third explained, worth falls
     with the square."""

@@ -36,7 +36,7 @@ class Combined:
     def __call__(self, queries: Sequence[Query]) -> list[Saliency]:
         cuts = [self._cuts(query.labels) for query in queries]
         found = [
-            backend([Query(q.view, labels[k]) for q, labels in zip(queries, cuts, strict=True)])
+            _asked(backend, [Query(q.view, labels[k]) for q, labels in zip(queries, cuts, strict=True)])
             for k, (backend, _) in enumerate(self._parts)
         ]
         return [self._joined(query, [of_part[k] for of_part in found]) for k, query in enumerate(queries)]
@@ -49,7 +49,7 @@ class Combined:
             cuts.append(mine)
         return [rest, *reversed(cuts)]
 
-    def _joined(self, query: Query, found: Sequence[Saliency]) -> Saliency:
+    def _joined(self, query: Query, found: Sequence[Saliency | None]) -> Saliency:
         """On the view's grid, on which the cloud samples."""
         box, (height, width) = query.view.box, query.view.depth_m.shape
         block = (box.x1 - box.x0) / width
@@ -58,6 +58,13 @@ class Combined:
         maps: list[Float32s] = [
             weight * one.sample(x, y).T.reshape(-1, height, width)
             for one, (_, weight) in zip(found, self._parts, strict=True)
+            if one is not None
         ]
         inside = query.view.inside.astype(np.float32)
         return Saliency(query.labels, np.concatenate(maps).astype(np.float32) * inside, box)
+
+
+def _asked(backend: SaliencyBackend, queries: Sequence[Query]) -> list[Saliency | None]:
+    """None for a query without labels: all that was wanted may be another part's."""
+    found = iter(backend([query for query in queries if query.labels]) if any(q.labels for q in queries) else ())
+    return [next(found) if query.labels else None for query in queries]
