@@ -102,7 +102,7 @@ def test_the_order_of_the_correspondences_does_not_matter_but_for_the_sampling(s
     order = np.random.default_rng(seed).permutation(len(pairs))
     shuffled = pairs[order]
     a, b = (candidates((p, cloud, model), QUICK)[0] for p in (pairs, shuffled))
-    assert apart(a.T_cam_obj, b.T_cam_obj) < 5e-3
+    assert apart(a.T_cam_obj, b.T_cam_obj) < 1e-3
     assert a.inlier_share == pytest.approx(b.inlier_share, abs=0.01)
 
 
@@ -126,9 +126,10 @@ def test_candidates_come_best_first_and_not_more_than_asked_for() -> None:
     given_ = problem(4, right=0.15)
     for most in (1, 3, 12):
         found = candidates(given_, CONFIG.model_copy(update={"candidates": most}))
-        shares = [c.inlier_share for c in found]
+        supports = [c.support for c in found]
         assert 1 <= len(found) <= most
-        assert shares[0] == pytest.approx(max(shares), abs=0.02)  # support counts nearness too
+        assert supports == sorted(supports, reverse=True)
+        assert all(0 < c.support <= c.inlier_share for c in found)
 
 
 def two_ways_up(right: float) -> tuple[Problem, Pose]:

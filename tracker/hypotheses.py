@@ -79,7 +79,8 @@ def sampled(
             triples = triples[:, ((bends[:, 0] - bends[:, 1]).abs() < normal_cosine).nonzero()[:, 0]]
     triples = triples[:, :most].T
     source, target = pairs.model_points[triples], pairs.points[triples]
-    return triangles(source[_spread(source)], target[_spread(source)])
+    spread = _spread(source)
+    return triangles(source[spread], target[spread])
 
 
 def seeded(

@@ -18,6 +18,7 @@ from tracker.umeyama import Motions, no_motions, umeyama_of_shared
 
 FIRST_BATCH = 8192  # samples before the first look at whether more are needed; every further batch is twice as large
 REFITS = 10
+STARTS = 8  # best hypotheses that are fitted whether or not they are alike
 
 
 class RegistrationConfig(BaseModel):
@@ -56,10 +57,12 @@ class RegistrationConfig(BaseModel):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A pose that some correspondences agree on. inlier_share: of all correspondences, in [0, 1]."""
+    """A pose that some correspondences agree on. inlier_share: of all correspondences, in [0, 1]. support: the same,
+    every inlier counted by how near it is and only if its normals agree; by it candidates are ranked."""
 
     T_cam_obj: Pose
     inlier_share: float
+    support: float
 
 
 def register(
@@ -90,15 +93,20 @@ def register_pairs(
     motions = _hypotheses(centred, diameter_m, config, generator)
     if len(motions) == 0:
         return []
-    motions = motions[_distinct(motions, diameter_m, 2 * config.candidates, config)]
-    motions, inliers = _refit(centred, motions, config)
+    best = torch.arange(min(STARTS, len(motions)), device=generator.device)  # near-equals may end at different optima
+    motions = motions[torch.cat((best, _distinct(motions, diameter_m, 2 * config.candidates, config))).unique()]
+    motions, inliers, supports = _refit(centred, motions, config)
     chosen = _distinct(motions, diameter_m, config.candidates, config)
     rotation = motions.rotation[chosen].double()
     translation = motions.translation[chosen].double() + centre - rotation @ model_centre
     return [
-        Candidate(Pose(R, t), share)
-        for R, t, share in zip(
-            rotation.cpu().numpy(), translation.cpu().numpy(), inliers[chosen].cpu().tolist(), strict=True
+        Candidate(Pose(R, t), share, support)
+        for R, t, share, support in zip(
+            rotation.cpu().numpy(),
+            translation.cpu().numpy(),
+            inliers[chosen].tolist(),
+            supports[chosen].tolist(),
+            strict=True,
         )
     ]
 
@@ -149,14 +157,15 @@ def _distinct(motions: Motions, diameter_m: float, most: int, config: Registrati
     return torch.tensor(chosen, dtype=torch.long, device=turns.device)
 
 
-def _refit(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> tuple[Motions, torch.Tensor]:
+def _refit(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> tuple[Motions, torch.Tensor, torch.Tensor]:
     """Every motion fitted to its inliers until they hardly change, those left out that their inliers do not determine,
-    the best supported first; and the share (B,) of the pairs that are inliers of each."""
+    the best supported first; the share (B,) of the pairs that are inliers of each, and its support (B,) a pair."""
     for _ in range(REFITS):
         motions = umeyama_of_shared(pairs.model_points, pairs.points, _closeness(pairs, motions, config) ** 2)
     kept = motions[motions.determined & ((_closeness(pairs, motions, config) > 0).sum(dim=1) > 2)]
-    kept = kept[support(pairs, kept, config.threshold_m).argsort(descending=True, stable=True)]
-    return kept, (_closeness(pairs, kept, config) > 0).float().mean(dim=1)
+    supports = support(pairs, kept, config.threshold_m) / len(pairs)
+    order = supports.argsort(descending=True, stable=True)
+    return kept[order], (_closeness(pairs, kept[order], config) > 0).float().mean(dim=1), supports[order]
 
 
 def _closeness(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> torch.Tensor:

@@ -75,8 +75,8 @@ class SaliencyBench:
         texts = encoder.encode_texts([encoder.prompt.format(word) for word in words])
         rng = np.random.default_rng(0)
         pixels = torch.from_numpy(rng.normal(size=(1, 3, encoder.size_px, encoder.size_px)).astype(np.float32))
-        parameter = next(network.parameters())
-        given = pixels.to(parameter.device, parameter.dtype)
+        device, dtype = network.device, network.dtype
+        given = pixels.to(device, dtype)
 
         def forward() -> None:
             with torch.no_grad():
@@ -88,7 +88,7 @@ class SaliencyBench:
         def loop() -> None:
             for text in torch.nn.functional.normalize(texts, dim=1)[: self.loop_concepts]:
                 picture = network.vision_model(pixel_values=given).pooler_output
-                (torch.nn.functional.normalize(picture, dim=1)[0] @ text.to(parameter.dtype)).backward()
+                (torch.nn.functional.normalize(picture, dim=1)[0] @ text.to(dtype)).backward()
                 network.zero_grad()
 
         for parameter in network.parameters():
@@ -107,8 +107,8 @@ class SaliencyBench:
             "loop_ms": loop_s * 1e3,
             "loop_concepts_run": self.loop_concepts,
             "parameters_mb": sum(p.numel() * p.element_size() for p in network.parameters()) / 2**20,
-            "precision": str(parameter.dtype),
-            "device": str(parameter.device),
+            "precision": str(dtype),
+            "device": str(device),
             "threads": torch.get_num_threads(),
             "weights": encoder.weights,
         }
