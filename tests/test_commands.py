@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
-import numpy as np
 import pytest
 
 import eval.__main__
@@ -18,7 +17,7 @@ import reference.__main__
 import tracker.__main__
 import tracker.sources
 from eval.bop_results import read_results
-from tracker.concept import ARRAYS, ConceptModel
+from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig, read_config
 from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import SourceError
@@ -156,22 +155,14 @@ def test_eval_wants_to_know_what_to_do(run: Run) -> None:
 # python -m reference
 
 
-def assert_same_model(a: Path, b: Path) -> None:
-    """But for the last bits of its numbers, in which vector units may differ from run to run."""
-    one, other = ConceptModel.load(a), ConceptModel.load(b)
-    assert (one.object_id, one.labels, one.fingerprint) == (other.object_id, other.labels, other.fingerprint)
-    for name in ARRAYS:
-        assert np.allclose(getattr(one, name), getattr(other, name), atol=1e-5)
-
-
-def test_reference_writes_a_model_and_says_what_it_is_worth(model: Path, run: Run, tmp_path: Path) -> None:
+def test_reference_writes_a_model_and_says_what_it_is_worth(model: Path, tmp_path: Path) -> None:
     made = ConceptModel.load(model)
     assert (made.object_id, made.backend) == (BOX, "attributes")
-    again = run("reference", SOURCE, "--object", BOX, "--views", 2, "--out", tmp_path / "new" / "box.concept")
+    again = process("reference", SOURCE, "--object", BOX, "--views", 2, "--out", tmp_path / "new" / "box.concept")
     assert (again.code, again.out) == (0, "")
     for word in (BOX, "attributes", f"{len(made)}", f"{made.diameter_m * 1000:.0f} mm"):
         assert word in again.err
-    assert_same_model(tmp_path / "new" / "box.concept", model)
+    assert (tmp_path / "new" / "box.concept").read_bytes() == model.read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -191,8 +182,8 @@ def test_reference_overwrites_only_when_it_is_told_to(model: Path, run: Run, tmp
     line = ("reference", SOURCE, "--object", BOX, "--views", 2, "--out", path)
     assert_refused(run(*line), "box.concept exists already", "--overwrite")
     assert path.read_text() == "precious"
-    assert run(*line, "--overwrite").code == 0
-    assert_same_model(path, model)
+    assert process(*line, "--overwrite").code == 0
+    assert path.read_bytes() == model.read_bytes()
 
 
 @pytest.mark.parametrize(
