@@ -102,18 +102,22 @@ def test_a_model_in_front_of_what_the_camera_sees_is_seen_through(
     assert behind.score < 0.05
 
 
+def without_lower_half(frame: Frame, depth_m: float) -> Frame:
+    """The lower half of the can is neither masked nor to be seen: something is there at another depth."""
+    rows, columns = np.nonzero(frame.masks["soup_can"])
+    lower = rows > np.median(rows)
+    mask, depth = frame.masks["soup_can"].copy(), frame.depth_m.copy()
+    mask[rows[lower], columns[lower]] = False
+    depth[rows[lower], columns[lower]] = depth_m
+    return replace(frame, masks={"soup_can": mask}, depth_m=depth)
+
+
 def test_surface_that_should_be_seen_and_is_empty_counts_against_a_pose(
     can_model: ConceptModel, can_frames: list[Frame], can_truth: Pose
 ) -> None:
     """The lower half of the mask and of the depth is the wall behind."""
-    frame = can_frames[0]
-    whole = judged(can_model, can_truth, seen(frame, can_model))
-    rows, columns = np.nonzero(frame.masks["soup_can"])
-    lower = rows > np.median(rows)
-    mask, depth_m = frame.masks["soup_can"].copy(), frame.depth_m.copy()
-    mask[rows[lower], columns[lower]] = False
-    depth_m[rows[lower], columns[lower]] = 1.2
-    half = judged(can_model, can_truth, seen(replace(frame, masks={"soup_can": mask}, depth_m=depth_m), can_model))
+    whole = judged(can_model, can_truth, seen(can_frames[0], can_model))
+    half = judged(can_model, can_truth, seen(without_lower_half(can_frames[0], 1.2), can_model))
     assert half.score < 0.65 * whole.score
     assert half.outside > 0.3
     assert half.hidden < 0.05
@@ -123,14 +127,10 @@ def test_what_something_in_front_hides_does_not_count_against_a_pose(
     can_model: ConceptModel, can_frames: list[Frame], can_truth: Pose
 ) -> None:
     """The lower half is hidden by something ten centimetres nearer."""
-    frame = can_frames[0]
-    whole = judged(can_model, can_truth, seen(frame, can_model))
-    rows, columns = np.nonzero(frame.masks["soup_can"])
-    lower = rows > np.median(rows)
-    mask, depth_m = frame.masks["soup_can"].copy(), frame.depth_m.copy()
-    mask[rows[lower], columns[lower]] = False
-    depth_m[rows[lower], columns[lower]] = can_truth.translation_m[2] - 0.1
-    half = judged(can_model, can_truth, seen(replace(frame, masks={"soup_can": mask}, depth_m=depth_m), can_model))
+    whole = judged(can_model, can_truth, seen(can_frames[0], can_model))
+    half = judged(
+        can_model, can_truth, seen(without_lower_half(can_frames[0], can_truth.translation_m[2] - 0.1), can_model)
+    )
     assert half.hidden == pytest.approx(0.5, abs=0.15)
     assert half.score > 0.9 * whole.score
     assert half.outside < 0.1
