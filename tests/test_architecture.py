@@ -28,7 +28,7 @@ ORDER = {
     "tracker": (
         "errors", "geometry", "frame", "sources", "view", "saliency", "cloud", "region", "reference_views",
         "grounding", "symmetry", "declared_symmetry", "concept", "measures", "matching", "appearance",
-        "projection", "least_squares", "closest_points", "umeyama", "hypotheses", "registration",
+        "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "verification", "refinement", "pose_filter", "config", "result", "stopwatch", "pipeline", "output",
         "viewer", "terminal", "__main__",
     ),

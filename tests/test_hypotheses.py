@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tracker.hypotheses import Pairs, sampled, seeded, squared_distances, support
-from tracker.umeyama import Motions
+from tracker.hypotheses import Pairs, fitted, sampled, seeded, squared_distances, support
+from tracker.umeyama import Motions, umeyama
 
 RADII_M = np.array([0.1, 0.06, 0.04])
 
@@ -49,6 +49,18 @@ def test_distances_are_those_of_the_moved_points(seed: int) -> None:
     moved = pairs.model_points @ motions.rotation.transpose(1, 2) + motions.translation[:, None]
     expected = ((moved - pairs.points) ** 2).sum(dim=2)
     assert torch.allclose(squared_distances(pairs, motions), expected, atol=1e-6)
+
+
+@given(st.integers(0, 10_000))
+def test_fits_of_the_same_pairs_are_those_of_each_problem_alone(seed: int) -> None:
+    pairs, _ = some_pairs(seed, 25, 0.5)
+    doubles = Pairs(*(part.double() for part in (pairs.points, pairs.normals, pairs.model_points, pairs.model_normals)))
+    weights = torch.from_numpy(np.random.default_rng(seed).uniform(0, 1, (6, 25)))
+    together = fitted(doubles, weights)
+    stacked = [part.expand(6, -1, -1) for part in (doubles.model_points, doubles.points)]
+    each = umeyama(stacked[0], stacked[1], weights)
+    assert torch.allclose(together.rotation, each.rotation, atol=1e-6)
+    assert torch.allclose(together.translation, each.translation, atol=1e-8)
 
 
 def test_support_counts_near_pairs_whose_normals_agree() -> None:

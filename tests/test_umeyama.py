@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tracker.geometry import Floats, Pose
-from tracker.umeyama import Motions, no_motions, triangles, umeyama, umeyama_of_shared
+from tracker.umeyama import Motions, no_motions, triangles, umeyama
 
 SEEDS = st.integers(0, 10_000)
 
@@ -114,18 +114,6 @@ def test_three_points_need_no_singular_value_decomposition(seed: int) -> None:
     assert torch.allclose(quick.rotation[fat], exact.rotation[fat], atol=1e-9)
     assert torch.allclose(quick.translation[fat], exact.translation[fat], atol=1e-9)
     assert torch.allclose(torch.det(quick.rotation[fat]), torch.ones(1, dtype=torch.float64))
-
-
-@given(SEEDS)
-def test_problems_of_the_same_points_are_one_product(seed: int) -> None:
-    source, target = point_set(seed, 25), point_set(seed + 1, 25)
-    source, target = source - source.mean(axis=0), target - target.mean(axis=0)
-    weights = torch.from_numpy(np.random.default_rng(seed).uniform(0, 1, (6, 25)))
-    shared = umeyama_of_shared(torch.from_numpy(source), torch.from_numpy(target), weights)
-    stacked = [torch.from_numpy(p).expand(6, -1, -1) for p in (source, target)]
-    each = umeyama(stacked[0], stacked[1], weights)
-    assert torch.allclose(shared.rotation, each.rotation, atol=1e-9)
-    assert torch.allclose(shared.translation, each.translation, atol=1e-9)
 
 
 def determined(points: Floats) -> bool:

@@ -7,54 +7,77 @@ two right correspondences keep their distance, and so do both with many others (
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
+from math import ceil
 
 import torch
 
-from tracker.umeyama import Motions, triangles, umeyama
+from tracker.umeyama import Motions, triangles, umeyama, umeyama_of_moments
 
+AT_A_TIME = 20_000  # samples whose first edges are tested together: what fits the cache
 LEAST_HEIGHT = 0.1  # of a triangle over its edge; flatter ones hardly fix the turn about it
 SAME_SIDE = 0.5  # least cosine between the normals of two points that are the same
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
     """M corresponding points, (M, 3) each: `points` of the cloud, `model_points` of the model, both about their means,
     so that single precision suffices; and their normals, of length 0 where there are none."""
 
-    points: torch.Tensor
-    normals: torch.Tensor
-    model_points: torch.Tensor
-    model_normals: torch.Tensor
+    def __init__(
+        self, points: torch.Tensor, normals: torch.Tensor, model_points: torch.Tensor, model_normals: torch.Tensor
+    ) -> None:
+        self.points, self.normals = points, normals
+        self.model_points, self.model_normals = model_points, model_normals
 
     def __len__(self) -> int:
         return len(self.points)
 
     def __getitem__(self, chosen: torch.Tensor) -> Pairs:
+        """Those at the indices (K,)."""
         parts = (self.points, self.normals, self.model_points, self.model_normals)
-        return Pairs(*(part[chosen] for part in parts))
+        return Pairs(*(part.index_select(0, chosen) for part in parts))
+
+    @cached_property
+    def terms(self) -> torch.Tensor:
+        """(M, 17) all products of a pair's coordinates that a squared distance or a least-squares motion consists of:
+        |p|^2 + |m|^2, 1, p, m, and p m^T row by row."""
+        p, m = self.points, self.model_points
+        own = (p * p).sum(dim=1, keepdim=True) + (m * m).sum(dim=1, keepdim=True)
+        return torch.cat((own, torch.ones_like(own), p, m, _outer(p, m)), dim=1)
+
+    @cached_property
+    def normal_terms(self) -> torch.Tensor | None:
+        """(M, 9) the same of the normals, None where there are none."""
+        return _outer(self.normals, self.model_normals) if self.normals.any() else None
 
 
 def squared_distances(pairs: Pairs, motions: Motions) -> torch.Tensor:
     """(B, M) |p - R m - t|^2, multiplied out, so that it is one matrix product."""
-    p, m = pairs.points, pairs.model_points
-    own = (p * p).sum(dim=1) + (m * m).sum(dim=1)
-    of_pair = torch.cat((own[:, None], torch.ones_like(own)[:, None], p, m, _outer(p, m)), dim=1)
     t, R = motions.translation, motions.rotation
     back = (R.transpose(1, 2) @ t.unsqueeze(2)).squeeze(2)
     one, far = torch.ones_like(t[:, :1]), (t * t).sum(dim=1, keepdim=True)
-    of_motion = torch.cat((one, far, -2 * t, 2 * back, -2 * R.flatten(1)), dim=1)
-    return of_motion @ of_pair.T
+    return torch.cat((one, far, -2 * t, 2 * back, -2 * R.flatten(1)), dim=1) @ pairs.terms.T
+
+
+def closeness(pairs: Pairs, motions: Motions, threshold_m: float) -> torch.Tensor:
+    """(B, M) from 1 where a pair meets under a motion to 0 from the threshold on."""
+    return squared_distances(pairs, motions).mul_(-1 / threshold_m**2).add_(1).clamp_(min=0)
 
 
 def support(pairs: Pairs, motions: Motions, threshold_m: float) -> torch.Tensor:
     """(B,) how well each motion explains the pairs: their squared distances, truncated (MSAC, Torr and Zisserman, CVIU
     2000), of those whose normals agree, if they have normals."""
-    kept = squared_distances(pairs, motions).mul_(-1 / threshold_m**2).add_(1).clamp_(min=0)
-    if pairs.normals.any():
-        agreement = motions.rotation.flatten(1) @ _outer(pairs.normals, pairs.model_normals).T
-        kept.mul_(agreement > SAME_SIDE)
+    kept = closeness(pairs, motions, threshold_m)
+    if pairs.normal_terms is not None:
+        kept.mul_(motions.rotation.flatten(1) @ pairs.normal_terms.T > SAME_SIDE)
     return kept.sum(dim=1)
+
+
+def fitted(pairs: Pairs, weights: torch.Tensor) -> Motions:
+    """Motions of least squared error under weights (B, M)."""
+    sums = weights @ pairs.terms[:, 1:]
+    centre, model_centre, second = (sums[:, 1:] / sums[:, :1].clamp_min(1e-12)).split((3, 3, 9), dim=1)
+    return umeyama_of_moments(model_centre, centre, second.reshape(-1, 3, 3))
 
 
 def sampled(
@@ -66,14 +89,24 @@ def sampled(
     most: int,
     generator: torch.Generator,
 ) -> Motions:
-    """Motions of up to `most` of `count` random triples, those that are congruent to within slack_m."""
-    triples = torch.randint(len(pairs), (3, count), generator=generator, device=generator.device)
+    """Motions of up to `most` of random triples, those that are congruent to within slack_m. Triples are drawn in
+    rounds that use every pair once, as many rounds as make at least `count`.
+
+    The pairs are shuffled once, and a round takes every pair with those at two random distances from it: whole rows
+    are compared with whole rows, where looking up single pairs would cost more than all arithmetic.
+    """
+    order = torch.randperm(len(pairs), generator=generator, device=generator.device)
+    steps = torch.randint(1, len(pairs), (2, ceil(count / len(pairs))), generator=generator, device=generator.device)
+    pairs = pairs[torch.cat((order, order))]  # twice, so that a step may go beyond the end
+    rounds, first = _congruent_with_one_at(steps[0], pairs, slack_m, shortest_m).unbind(dim=1)
+    triples = torch.stack((first, first + steps[0][rounds], first + steps[1][rounds]))
     together = _padded(pairs.points, pairs.model_points)
-    tilts = _padded(pairs.normals, pairs.model_normals) if pairs.normals.any() else None
-    for i, j in ((0, 1), (1, 2), (2, 0)):  # edge by edge: the second test sees only what passes the first
-        edges = _differences(together, triples[i], triples[j])
-        fits = ((edges[:, 0] - edges[:, 1]).abs() < slack_m) & (edges[:, 0] > shortest_m)
-        triples = triples[:, fits.nonzero()[:, 0]]
+    tilts = None if pairs.normal_terms is None else _padded(pairs.normals, pairs.model_normals)
+    for i, j in ((0, 1), (1, 2), (2, 0)):  # edge by edge: each test sees only what passes those before
+        if (i, j) != (0, 1):
+            edges = _differences(together, triples[i], triples[j])
+            fits = _congruent(edges[:, 0], edges[:, 1], slack_m, shortest_m)
+            triples = triples[:, fits.nonzero()[:, 0]]
         if tilts is not None:
             bends = (tilts[triples[i]] * tilts[triples[j]]).reshape(-1, 2, 4).sum(dim=2)
             triples = triples[:, ((bends[:, 0] - bends[:, 1]).abs() < normal_cosine).nonzero()[:, 0]]
@@ -117,6 +150,25 @@ def _outer(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 def _padded(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     """(M, 8): both of a pair side by side, so that one look-up brings them, and aligned, so that it is quick."""
     return torch.nn.functional.pad(torch.stack((a, b), dim=1), (0, 1)).flatten(1).contiguous()
+
+
+def _congruent_with_one_at(steps: torch.Tensor, pairs: Pairs, slack_m: float, shortest_m: float) -> torch.Tensor:
+    """(K, 2) number of the step and pair of the first half, where the pair's edge to the one that many further on is
+    as long in the cloud as in the model."""
+    half = len(pairs) // 2
+    twice = torch.cat((pairs.points, pairs.model_points), dim=1).T.contiguous()
+    rows, further = twice[:, :half], twice.unfold(1, half, 1)
+    found = []
+    for some in steps.split(max(1, AT_A_TIME // half)):
+        apart = further[:, some].sub_(rows.unsqueeze(1)).square_()
+        edge, model_edge = ((part[0] + part[1]).add_(part[2]).sqrt_() for part in (apart[:3], apart[3:]))
+        found.append(_congruent(edge, model_edge, slack_m, shortest_m))
+    return torch.cat(found).nonzero()
+
+
+def _congruent(edge: torch.Tensor, model_edge: torch.Tensor, slack_m: float, shortest_m: float) -> torch.Tensor:
+    """Which lengths in the cloud and in the model are alike, and no needle's."""
+    return ((edge - model_edge).abs_() < slack_m) & (edge > shortest_m)
 
 
 def _differences(together: torch.Tensor, i: torch.Tensor, j: torch.Tensor) -> torch.Tensor:

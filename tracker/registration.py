@@ -12,12 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
 from tracker.geometry import Pose
-from tracker.hypotheses import Pairs, sampled, seeded, squared_distances, support
+from tracker.hypotheses import Pairs, closeness, fitted, sampled, seeded, support
 from tracker.matching import Correspondences
-from tracker.umeyama import Motions, no_motions, umeyama_of_shared
+from tracker.threads import one_thread
+from tracker.umeyama import Motions, no_motions
 
 FIRST_BATCH = 8192  # samples before the first look at whether more are needed; every further batch is twice as large
-REFITS = 10
+REFITS, SETTLED = 10, 2e-4  # at most so many, or until no entry of a rotation changes by more
 STARTS = 8  # best hypotheses that are fitted whether or not they are alike
 
 
@@ -79,6 +80,7 @@ def register(
     return register_pairs(pairs, model.diameter_m, config, generator)
 
 
+@one_thread()
 def register_pairs(
     pairs: Pairs, diameter_m: float, config: RegistrationConfig, generator: torch.Generator
 ) -> list[Candidate]:
@@ -160,14 +162,14 @@ def _distinct(motions: Motions, diameter_m: float, most: int, config: Registrati
 def _refit(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> tuple[Motions, torch.Tensor, torch.Tensor]:
     """Every motion fitted to its inliers until they hardly change, those left out that their inliers do not determine,
     the best supported first; the share (B,) of the pairs that are inliers of each, and its support (B,) a pair."""
+    threshold_m = config.threshold_m
     for _ in range(REFITS):
-        motions = umeyama_of_shared(pairs.model_points, pairs.points, _closeness(pairs, motions, config) ** 2)
-    kept = motions[motions.determined & ((_closeness(pairs, motions, config) > 0).sum(dim=1) > 2)]
-    supports = support(pairs, kept, config.threshold_m) / len(pairs)
+        before, motions = motions, fitted(pairs, closeness(pairs, motions, threshold_m).square_())  # Tukey's weights
+        if float((motions.rotation - before.rotation).abs().amax()) < SETTLED:
+            break
+    motions = motions[motions.determined]
+    inliers = closeness(pairs, motions, threshold_m) > 0
+    supports = support(pairs, motions, threshold_m) / len(pairs)
     order = supports.argsort(descending=True, stable=True)
-    return kept[order], (_closeness(pairs, kept[order], config) > 0).float().mean(dim=1), supports[order]
-
-
-def _closeness(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> torch.Tensor:
-    """(B, M) from 1 where a pair meets under a motion to 0 from the threshold on; its square is Tukey's weight."""
-    return (1 - squared_distances(pairs, motions) / config.threshold_m**2).clamp_min(0)
+    order = order[inliers.sum(dim=1)[order] > 2]
+    return motions[order], inliers[order].float().mean(dim=1), supports[order]

@@ -52,14 +52,9 @@ def umeyama(source: torch.Tensor, target: torch.Tensor, weights: torch.Tensor, w
     return _solved(covariance, centre_s, centre_t, (share * apart * apart).sum(dim=(1, 2)) if with_scale else None)
 
 
-def umeyama_of_shared(source: torch.Tensor, target: torch.Tensor, weights: torch.Tensor) -> Motions:
-    """`umeyama` where all problems have the same points (N, 3) about the origin and differ in their weights (B, N)
-    only: all sums are one matrix product."""
-    products = (target.unsqueeze(2) * source.unsqueeze(1)).flatten(1)
-    sums = weights @ torch.cat((torch.ones_like(source[:, :1]), source, target, products), dim=1)
-    centre_s, centre_t, second = (sums[:, 1:] / sums[:, :1].clamp_min(1e-12)).split((3, 3, 9), dim=1)
-    covariance = second.reshape(-1, 3, 3) - centre_t.unsqueeze(2) * centre_s.unsqueeze(1)
-    return _solved(covariance, centre_s, centre_t, None)
+def umeyama_of_moments(centre_s: torch.Tensor, centre_t: torch.Tensor, second: torch.Tensor) -> Motions:
+    """`umeyama` where the weighted means (B, 3) of both sides are known, and that of target source^T, (B, 3, 3)."""
+    return _solved(second - centre_t.unsqueeze(2) * centre_s.unsqueeze(1), centre_s, centre_t, None)
 
 
 def _solved(
