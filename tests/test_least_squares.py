@@ -27,6 +27,12 @@ def displacement(motion: Floats, arms: Floats) -> Floats:
     return np.cross(motion[:3], arms) + motion[3:]
 
 
+def of_picture(gradients: Floats, residuals: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """Structure (3, N) and pull (2, N) of one channel with gradients (N, 2)."""
+    x, y = gradients.T
+    return weights * np.stack((x * x, x * y, y * y)), weights * residuals * np.stack((x, y))
+
+
 @given(st.floats(-5, 5), st.floats(0.01, 3))
 def test_tukey_is_one_at_zero_even_falling_and_nothing_from_its_reach_on(residual: float, reach: float) -> None:
     weight = tukey(np.array([0.0, residual, -residual, 1.01 * residual, reach, 2 * reach]), reach)
@@ -76,10 +82,11 @@ def test_the_offset_is_marginalised_as_in_the_full_eight_by_eight_system(seed: i
     arms, directions, weights = scattered(seed)
     rng = np.random.default_rng([seed, 3])
     gradients, residuals = rng.normal(size=(len(arms), 2)), rng.normal(size=len(arms))
-    depth, colour = rng.normal(size=len(arms)), rng.normal(size=(len(arms), 3))
+    depth, along = rng.normal(size=len(arms)), rng.normal(size=(2, len(arms), 3))
+    colour = gradients[:, :1] * along[0] + gradients[:, 1:] * along[1]
     equations = MotionEquations()
     equations.add(arms, directions, depth, weights)
-    equations.add_colour(arms, colour, gradients, residuals, weights)
+    equations.add_picture(arms, *along, *of_picture(gradients, residuals, weights))
     matrix, vector = equations.without_offset(information)
 
     of_depth = np.hstack((np.cross(arms, directions), directions, np.zeros((len(arms), 2))))
@@ -94,14 +101,14 @@ def test_the_offset_is_marginalised_as_in_the_full_eight_by_eight_system(seed: i
 def test_a_shift_of_the_whole_colour_picture_moves_the_pose_only_where_the_offset_is_held() -> None:
     arms, _, weights = scattered(4)
     gradients = np.random.default_rng(5).normal(size=(len(arms), 2))
-    directions = np.hstack((gradients, np.zeros((len(arms), 1)))) * 800  # a pixel is 1.25 mm
+    along = [np.tile(axis, (len(arms), 1)) * 800 for axis in np.eye(3)[:2]]  # a pixel is 1.25 mm
     residuals = gradients @ [1.5, -0.5]  # what a picture that is 1.5 and 0.5 pixels off does
     solutions = {}
     for information in (0.0, 1e9):
         equations = MotionEquations()
         for axis in np.eye(3):  # depth that holds the pose where it is
             equations.add(arms, np.tile(axis, (len(arms), 1)), np.zeros(len(arms)), 1e4 * weights)
-        equations.add_colour(arms, directions, gradients, residuals, weights)
+        equations.add_picture(arms, *along, *of_picture(gradients, residuals, weights))
         solutions[information] = np.linalg.solve(*equations.without_offset(information))
     assert np.abs(solutions[0.0]).max() < 1e-6
     assert np.abs(solutions[1e9][3:5]).max() > 1e-3

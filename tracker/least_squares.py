@@ -28,18 +28,24 @@ class MotionEquations:
     def add(self, arms: Floats, directions: Floats, residuals: Floats, weights: Floats) -> None:
         """Residuals (N,) that a motion d of the point (object origin + arm) lessens by direction . d. Rest: (N, 3)."""
         jacobian = _motion_jacobian(arms, directions)
-        weighted = jacobian * weights[:, None]
-        self._matrix[:6, :6] += weighted.T @ jacobian
-        self._vector[:6] += weighted.T @ residuals
+        weighted = jacobian * weights
+        self._matrix += weighted @ jacobian.T
+        self._vector += weighted @ residuals
 
-    def add_colour(
-        self, arms: Floats, directions: Floats, gradients: Floats, residuals: Floats, weights: Floats
+    def add_picture(
+        self, arms: Floats, along_columns: Floats, along_rows: Floats, structure: Floats, pull: Floats
     ) -> None:
-        """As `add`, and the residual also lessens by gradient (N, 2) . offset."""
-        jacobian = np.concatenate((_motion_jacobian(arms, directions), gradients), axis=1)
-        weighted = jacobian * weights[:, None]
-        self._matrix += weighted.T @ jacobian
-        self._vector += weighted.T @ residuals
+        """Residuals of a picture's channels, which the offset lessens too (Lucas and Kanade, IJCAI 1981).
+
+        along_columns, along_rows: (N, 3) pixels by which a metre of its motion moves a point in the picture. Summed
+        over the channels with their weights: structure (3, N), the gradient's square along columns, its product along
+        both, its square along rows; pull (2, N), the gradient along columns and along rows times the residual.
+        """
+        columns, rows = _motion_jacobian(arms, along_columns), _motion_jacobian(arms, along_rows)
+        columns[6], rows[7] = 1, 1
+        self._matrix += (structure[0] * columns + structure[1] * rows) @ columns.T
+        self._matrix += (structure[1] * columns + structure[2] * rows) @ rows.T
+        self._vector += columns @ pull[0] + rows @ pull[1]
 
     def without_offset(self, offset_information: float) -> tuple[Floats, Floats]:
         """(6, 6) matrix and (6,) vector of the motion alone. offset_information: how surely the offset is nothing, in
@@ -57,10 +63,9 @@ def moved(T_cam_obj: Pose, matrix: Floats, vector: Floats) -> Pose:
 
 
 def _motion_jacobian(arms: Floats, directions: Floats) -> Floats:
-    """(N, 6): arm x direction, direction. Written out, as numpy.cross takes four times as long."""
-    jacobian = np.empty((len(arms), 6))
-    jacobian[:, 3:] = directions
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        jacobian[:, k] = arms[:, i] * directions[:, j] - arms[:, j] * directions[:, i]
+    """(8, N): arm x direction, direction, nothing for the offset. Written out, as numpy.cross takes much longer."""
+    jacobian = np.zeros((8, len(arms)))
+    (x, y, z), (u, v, w) = arms.T, directions.T
+    jacobian[0], jacobian[1], jacobian[2] = y * w - z * v, z * u - x * w, x * v - y * u
+    jacobian[3:6] = directions.T
     return jacobian

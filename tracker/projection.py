@@ -64,10 +64,12 @@ def nearest_pixels(projection: Projection, camera: Intrinsics) -> tuple[npt.NDAr
     return rows, columns
 
 
-def interpolate(image: Float32s, columns: Floats, rows: Floats) -> Floats:
+def interpolate(image: Float32s, columns: Floats, rows: Floats) -> Float32s:
     """(N, C) values of an image (h, w, C) between its pixels; columns and rows at least one pixel inside."""
     left, top = columns.astype(np.intp), rows.astype(np.intp)
-    a, b = (columns - left)[:, None], (rows - top)[:, None]
-    upper = image[top, left] * (1 - a) + image[top, left + 1] * a
-    lower = image[top + 1, left] * (1 - a) + image[top + 1, left + 1] * a
+    a, b = (np.asarray(part, np.float32)[:, None] for part in (columns - left, rows - top))
+    width, corner = image.shape[1], top * image.shape[1] + left
+    pixels = image.reshape(-1, image.shape[2])
+    upper = pixels.take(corner, axis=0) * (1 - a) + pixels.take(corner + 1, axis=0) * a
+    lower = pixels.take(corner + width, axis=0) * (1 - a) + pixels.take(corner + width + 1, axis=0) * a
     return upper * (1 - b) + lower * b

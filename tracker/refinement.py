@@ -11,22 +11,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from tracker.appearance import ModelAppearance, ViewAppearance, model_appearance
+from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
-from tracker.geometry import Floats, Pose
+from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.least_squares import MotionEquations, moved, tukey
 from tracker.projection import interpolate, nearest_pixels, project
 from tracker.symmetry import Symmetry
-from tracker.view import ObjectView
+from tracker.view import Float32s, ObjectView
 
 LEAST_POINTS = 20  # fewer do not carry six degrees of freedom
+COARSE_POINTS = 1500  # at most, while colours are smoothed: there more of them say the same again
 FACING_LEAST = 0.15  # cosine: more grazing surfaces have no depth and no colour worth using
 PLAIN_VARIANCE = 20.0  # squared Lab units: a surface of less contrast than this has no gain to be seen
 GAIN_RANGE = (0.6, 1.6)
 
 
 class RefinementConfig(BaseModel):
-    """model_points: how many take part. coarse_steps, fine_steps: iterations on smoothed and on fine colours.
+    """model_points: how many take part. coarse_steps, fine_steps: iterations on smoothed and on fine colours, at most.
+    settled: a step that moves the object by less than this share of its diameter ends them.
     depth_sigma_m: noise of the pooled depth; at the first step it is taken to be depth_sigma_start times that.
     lab_sigma: least noise assumed in colour. colour_weight: of the colour terms against the depth term.
     offset_information: how surely colour and depth are registered, in inverse squared view pixels."""
@@ -36,6 +38,7 @@ class RefinementConfig(BaseModel):
     model_points: int = Field(default=1000, ge=50)
     coarse_steps: int = Field(default=4, ge=0)
     fine_steps: int = Field(default=4, ge=1)
+    settled: float = Field(default=2e-4, ge=0)
     depth_sigma_m: float = Field(default=0.0015, gt=0)
     depth_sigma_start: float = Field(default=2.7, ge=1)
     lab_sigma: float = Field(default=2.0, gt=0)
@@ -77,11 +80,11 @@ class Refiner:
     """Holds the sample of a model's points that is aligned, and their colours."""
 
     def __init__(self, model: ConceptModel, config: RefinementConfig, pixels_across: int) -> None:
-        self._config = config
+        self._config, self._diameter_m = config, model.diameter_m
         appearance = model_appearance(model, pixels_across)
         chosen = np.random.default_rng(0).permutation(len(model))[: config.model_points]
         self._points, self._normals = model.points[chosen], model.normals[chosen]
-        self._appearance = ModelAppearance((appearance.lab[0][chosen], appearance.lab[1][chosen]))
+        self._lab = tuple(np.ascontiguousarray(lab[chosen].T, np.float32) for lab in appearance.lab)
 
     def __call__(self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance) -> Refined | None:
         """None where too few model points meet the object's pixels."""
@@ -90,19 +93,24 @@ class Refiner:
             config.depth_sigma_start, 1, config.coarse_steps + config.fine_steps
         )
         levels = (1,) * config.coarse_steps + (0,) * config.fine_steps
-        refined = None
-        for sigma_m, level in zip(sigmas_m, levels, strict=True):
+        refined, settled, last = None, None, len(levels) - 1
+        for step, (sigma_m, level) in enumerate(zip(sigmas_m, levels, strict=True)):
+            if level == settled and step < last:
+                continue
             linear = self._linearise(T_cam_obj, view, appearance, float(sigma_m), level)
             if linear is None:
                 return None
-            T_cam_obj = moved(T_cam_obj, linear.matrix, linear.vector)
+            before, T_cam_obj = T_cam_obj, moved(T_cam_obj, linear.matrix, linear.vector)
             refined = Refined(T_cam_obj, linear.matrix, linear.residual_m, linear.aligned)
+            moved_m = before.distance_to_m(T_cam_obj) + before.angle_to_rad(T_cam_obj) * self._diameter_m / 2
+            settled = level if moved_m < config.settled * self._diameter_m else None
         return refined
 
     def _linearise(
         self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance, sigma_m: float, level: int
     ) -> _Linearised | None:
-        at = project(self._points, self._normals, T_cam_obj, view.camera)
+        count = COARSE_POINTS if level else len(self._points)
+        at = project(self._points[:count], self._normals[:count], T_cam_obj, view.camera)
         usable = np.flatnonzero(at.within(view.camera, 2) & (at.facing > FACING_LEAST))
         rows, columns = (pixels[usable] for pixels in nearest_pixels(at, view.camera))
         measured_m = view.depth_m[rows, columns].astype(np.float64)
@@ -116,37 +124,40 @@ class Refiner:
         equations = MotionEquations()
         equations.add(arms, normals, residual_m, facing * tukey(residual_m, 4 * sigma_m) / sigma_m**2)
 
-        place = (at.columns[usable], at.rows[usable])
-        lab, gradient = interpolate(appearance.lab[level], *place), interpolate(appearance.gradient[level], *place)
-        residual, weights = self._colour_residuals(lab, self._appearance.lab[level][usable], facing)
-        for channel in range(3):
-            along = gradient[:, [channel, channel + 3]]
-            equations.add_colour(
-                arms, _per_metre(along, points, view), along, residual[:, channel], weights[:, channel]
-            )
+        seen = np.ascontiguousarray(interpolate(appearance.lab[level], at.columns[usable], at.rows[usable]).T)
+        gradient = np.ascontiguousarray(appearance.gradient[level][rows, columns].T).reshape(2, 3, -1)
+        residual, weights = self._colour_residuals(seen, self._lab[level][:, usable], facing)
+        weighted = weights * gradient
+        structure = np.stack([(weighted[i] * gradient[j]).sum(axis=0) for i, j in ((0, 0), (0, 1), (1, 1))])
+        pull = (weighted * residual).sum(axis=1)
+        equations.add_picture(arms, *_pixels_per_metre(points, view.camera), structure, pull)
         matrix, vector = equations.without_offset(self._config.offset_information)
         return _Linearised(matrix, vector, float(np.median(np.abs(residual_m))), len(usable))
 
-    def _colour_residuals(self, seen: Floats, expected: Floats, facing: Floats) -> tuple[Floats, Floats]:
-        """Residuals (N, 3) of the Lab channels and their weights, after each channel's gain and offset between model
+    def _colour_residuals(self, seen: Float32s, expected: Floats, facing: Floats) -> tuple[Floats, Floats]:
+        """Residuals (3, N) of the Lab channels and their weights, after each channel's gain and offset between model
         and picture are taken off: they are exposure and white balance. Robust by Geman and McClure's function."""
-        weights = np.repeat(facing[:, None], 3, axis=1)
-        robust, residual, sigma = weights, expected - seen, np.full(3, self._config.lab_sigma)
+        facing = facing.astype(np.float32)
+        robust, residual, sigma = facing * np.ones_like(seen), expected - seen, np.ones_like(seen[:, :1])
         for _ in range(2):
-            share = robust / (robust.sum(axis=0) + 1e-9)
-            mean_seen, centred = (share * seen).sum(axis=0), expected - (share * expected).sum(axis=0)
-            variance = (share * centred**2).sum(axis=0)
-            together = (share * centred * (seen - mean_seen)).sum(axis=0)
+            share = robust / (robust.sum(axis=1, keepdims=True) + 1e-9)
+            mean_seen = (share * seen).sum(axis=1, keepdims=True)
+            centred = expected - (share * expected).sum(axis=1, keepdims=True)
+            leaning = share * centred
+            variance = (leaning * centred).sum(axis=1, keepdims=True)
+            together = (leaning * (seen - mean_seen)).sum(axis=1, keepdims=True)
             gain = np.clip((together + PLAIN_VARIANCE) / (variance + PLAIN_VARIANCE), *GAIN_RANGE)
             residual = gain * centred + mean_seen - seen
-            sigma = np.maximum(1.4826 * np.median(np.abs(residual), axis=0), self._config.lab_sigma)
-            robust = weights / (1 + (residual / (2 * sigma)) ** 2) ** 2
+            spread = np.median(np.abs(residual[:, ::2]), axis=1, keepdims=True)  # of half: it takes the most time here
+            sigma = np.maximum(1.4826 * spread, self._config.lab_sigma)
+            robust = facing / (1 + (residual / (2 * sigma)) ** 2) ** 2
         return residual, self._config.colour_weight * robust / sigma**2
 
 
-def _per_metre(gradient: Floats, points: Floats, view: ObjectView) -> Floats:
-    """(N, 3) change of a channel a metre of a point's motion, from its change a pixel (N, 2)."""
-    along_x = gradient[:, 0] * view.camera.fx / points[:, 2]
-    along_y = gradient[:, 1] * view.camera.fy / points[:, 2]
-    along_z = -(along_x * points[:, 0] + along_y * points[:, 1]) / points[:, 2]
-    return np.stack((along_x, along_y, along_z), axis=1)
+def _pixels_per_metre(points: Floats, camera: Intrinsics) -> tuple[Floats, Floats]:
+    """(N, 3) each: change of a point's column and of its row a metre of its motion."""
+    along_columns, along_rows = np.zeros_like(points), np.zeros_like(points)
+    x, y, z = points.T
+    along_columns[:, 0], along_columns[:, 2] = camera.fx / z, -camera.fx * x / z**2
+    along_rows[:, 1], along_rows[:, 2] = camera.fy / z, -camera.fy * y / z**2
+    return along_columns, along_rows
