@@ -86,7 +86,7 @@ def test_the_offset_is_marginalised_as_in_the_full_eight_by_eight_system(seed: i
     colour = gradients[:, :1] * along[0] + gradients[:, 1:] * along[1]
     equations = MotionEquations()
     equations.add(arms, directions, depth, weights)
-    equations.add_picture(arms, *along, *of_picture(gradients, residuals, weights))
+    equations.add_picture(arms, along[0], along[1], *of_picture(gradients, residuals, weights))
     matrix, vector = equations.without_offset(information)
 
     of_depth = np.hstack((np.cross(arms, directions), directions, np.zeros((len(arms), 2))))
@@ -108,7 +108,7 @@ def test_a_shift_of_the_whole_colour_picture_moves_the_pose_only_where_the_offse
         equations = MotionEquations()
         for axis in np.eye(3):  # depth that holds the pose where it is
             equations.add(arms, np.tile(axis, (len(arms), 1)), np.zeros(len(arms)), 1e4 * weights)
-        equations.add_picture(arms, *along, *of_picture(gradients, residuals, weights))
+        equations.add_picture(arms, along[0], along[1], *of_picture(gradients, residuals, weights))
         solutions[information] = np.linalg.solve(*equations.without_offset(information))
     assert np.abs(solutions[0.0]).max() < 1e-6
     assert np.abs(solutions[1e9][3:5]).max() > 1e-3
