@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.geometry import Floats, Pose
-from tracker.least_squares import DAMPING, MotionEquations, moved, tukey
+from tracker.least_squares import DAMPING, MotionEquations, free_directions, moved, tukey
 
 SEEDS = st.integers(0, 10_000)
 POSE = Pose.exp((0.3, -0.2, 0.5, 0.02, -0.05, 0.7))
@@ -139,6 +139,27 @@ def test_what_the_data_leave_free_keeps_still(axis: int) -> None:
     assert shift_m[axis] == pytest.approx(0.002, rel=0.01)
     assert np.abs(np.delete(shift_m, axis)).max() < 1e-9
     assert motion.angle_to_rad(POSE) < 1e-3
+
+
+@given(st.integers(0, 2), st.floats(0.01, 1))
+def test_a_plane_leaves_two_slides_and_a_turn_free_at_any_size(axis: int, radius_m: float) -> None:
+    arms = np.random.default_rng(8).uniform(-radius_m, radius_m, (200, 3))
+    arms[:, axis] = 0
+    equations = MotionEquations()
+    equations.add(arms, np.tile(np.eye(3)[axis], (200, 1)), np.zeros(200), np.ones(200))
+    free = free_directions(equations.without_offset(0.0)[0], radius_m)
+    assert len(free) == 3
+    for motion in free:
+        assert np.abs(displacement(motion, arms)[:, axis]).max() < 1e-6
+        assert np.abs(displacement(motion, arms)).max() > 0.1
+
+
+@given(SEEDS)
+def test_nothing_is_free_where_points_face_everywhere(seed: int) -> None:
+    arms, directions, weights = scattered(seed, 200)
+    equations = MotionEquations()
+    equations.add(arms, directions, np.zeros(200), weights)
+    assert len(free_directions(equations.without_offset(0.0)[0], 0.05)) == 0
 
 
 def test_no_data_at_all_move_nothing() -> None:

@@ -377,7 +377,7 @@ def test_a_pose_found_elsewhere_has_to_be_clearly_better(
     def found(score: float | None, origin: str) -> _Hypothesis | None:
         if score is None:
             return None
-        refined = Refined(Pose.identity(), np.eye(6), 0.0, 100)
+        refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
         return _Hypothesis(refined, replace(NOTHING_SEEN, score=score), origin)
 
     config = TrackerConfig(accept=0.25, jump=0.1)

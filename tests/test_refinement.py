@@ -181,6 +181,10 @@ def test_what_shape_leaves_free_has_the_least_information(
             axis_cam = found.T_cam_obj.rotation[:, 2]
             assert abs(vectors[:3, 0] @ axis_cam) > 0.9
             assert values[0] < 0.1 * values[1]
+            assert len(found.free) == 1
+            assert abs(found.free[0, :3] @ axis_cam) * can_model.diameter_m / 2 > 0.9
+        else:
+            assert len(found.free) == 0
     assert sigmas_rad[1.0] < 0.5 * sigmas_rad[0]
 
 

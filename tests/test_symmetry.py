@@ -131,8 +131,10 @@ def test_information_goes_with_the_origin_when_a_result_is_turned(
     """A small motion costs the same, whichever of the equivalent poses it is told of."""
     symmetry = parse_symmetry("z:inf", ORIGIN_M)
     square = np.random.default_rng(1).normal(size=(6, 6))
-    found = Refined(pose, square @ square.T, 0.0, 100)
+    found = Refined(pose, square @ square.T, np.eye(6)[:2], 0.0, 100)
     turned = found.nearest(pose @ Pose.exp([0, 0, angle_rad, 0, 0, 0]), symmetry)
+    for before, carried in zip(found.free, turned.free, strict=True):
+        assert carried @ turned.information @ carried == pytest.approx(before @ found.information @ before, rel=1e-6)
     small = 1e-6 * np.array(motion)
     after = turned.T_cam_obj.nudged(small)
     same = after @ turned.T_cam_obj.inverse() @ pose  # the same motion of the camera's space

@@ -6,6 +6,7 @@ import numpy as np
 
 from tracker.geometry import Floats, Pose
 
+FREE = 20.0  # a direction this many times less certain than the best known one is left free by the data
 DAMPING = 1e-3  # of each parameter's own curvature: keeps still what the data leave free
 
 
@@ -60,6 +61,17 @@ def moved(T_cam_obj: Pose, matrix: Floats, vector: Floats) -> Pose:
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-12))
     damped = matrix / np.outer(scale, scale) + DAMPING * np.eye(6)
     return T_cam_obj.nudged(np.linalg.solve(damped, vector / scale) / scale)
+
+
+def free_directions(information: Floats, radius_m: float) -> Floats:
+    """(k, 6) motions (turn, radians; shift, metres) that information (6, 6) leaves free, the freest first: a can of one
+    colour has its turn about the axis, a lone plane three. Each moves a point at the object's radius by about a metre.
+
+    Turns and shifts are compared by how far they move such a point.
+    """
+    scale = np.array([1 / radius_m] * 3 + [1.0] * 3)
+    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+    return (vectors.T * scale)[values < values[-1] / FREE**2]
 
 
 def _motion_jacobian(arms: Floats, directions: Floats) -> Floats:

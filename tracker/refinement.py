@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
 from tracker.geometry import Floats, Intrinsics, Pose
-from tracker.least_squares import MotionEquations, moved, tukey
+from tracker.least_squares import MotionEquations, free_directions, moved, tukey
 from tracker.projection import interpolate, nearest_pixels, project
 from tracker.symmetry import Symmetry
 from tracker.view import Float32s, ObjectView
@@ -28,7 +28,7 @@ GAIN_RANGE = (0.6, 1.6)
 
 class RefinementConfig(BaseModel):
     """model_points: how many take part. coarse_steps, fine_steps: iterations on smoothed and on fine colours, at most.
-    settled: a step that moves the object by less than this share of its diameter ends them.
+    settled: a step that moves the object by less than this share of its radius ends them.
     depth_sigma_m: noise of the pooled depth; at the first step it is taken to be depth_sigma_start times that.
     lab_sigma: least noise assumed in colour. colour_weight: of the colour terms against the depth term.
     offset_information: how surely colour and depth are registered, in inverse squared view pixels."""
@@ -38,7 +38,7 @@ class RefinementConfig(BaseModel):
     model_points: int = Field(default=1000, ge=50)
     coarse_steps: int = Field(default=4, ge=0)
     fine_steps: int = Field(default=4, ge=1)
-    settled: float = Field(default=2e-4, ge=0)
+    settled: float = Field(default=4e-4, ge=0)
     depth_sigma_m: float = Field(default=0.0015, gt=0)
     depth_sigma_start: float = Field(default=2.7, ge=1)
     lab_sigma: float = Field(default=2.0, gt=0)
@@ -49,11 +49,13 @@ class RefinementConfig(BaseModel):
 @dataclass(frozen=True, slots=True, eq=False)
 class Refined:
     """information: (6, 6) inverse covariance of (turn, radians; shift, metres) in camera axes about the object's
-    origin, as far as noise makes it: biases of the camera and of the model come on top. residual_m: median distance of
-    the aligned pixels to the model's surface. aligned: how many model points met their pixel."""
+    origin, as far as noise makes it: biases of the camera and of the model come on top. free: (k, 6) motions that the
+    data leave free, see `free_directions`: there the pose is where the search began. residual_m: median distance of the
+    aligned pixels to the model's surface. aligned: how many model points met their pixel."""
 
     T_cam_obj: Pose
     information: Floats
+    free: Floats
     residual_m: float
     aligned: int
 
@@ -65,7 +67,8 @@ class Refined:
         # A turn w and a shift v about the new origin are, about the old one at d from it, w and v + w x d.
         d_m, carried = self.T_cam_obj.translation_m - pose.translation_m, np.eye(6)
         carried[3:, :3] = np.cross(np.eye(3), d_m).T
-        return replace(self, T_cam_obj=pose, information=carried.T @ self.information @ carried)
+        information, free = carried.T @ self.information @ carried, self.free @ np.linalg.inv(carried).T
+        return replace(self, T_cam_obj=pose, information=information, free=free)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +83,7 @@ class Refiner:
     """Holds the sample of a model's points that is aligned, and their colours."""
 
     def __init__(self, model: ConceptModel, config: RefinementConfig, pixels_across: int) -> None:
-        self._config, self._diameter_m = config, model.diameter_m
+        self._config, self._radius_m = config, model.diameter_m / 2
         appearance = model_appearance(model, pixels_across)
         chosen = np.random.default_rng(0).permutation(len(model))[: config.model_points]
         self._points, self._normals = model.points[chosen], model.normals[chosen]
@@ -93,7 +96,7 @@ class Refiner:
             config.depth_sigma_start, 1, config.coarse_steps + config.fine_steps
         )
         levels = (1,) * config.coarse_steps + (0,) * config.fine_steps
-        refined, settled, last = None, None, len(levels) - 1
+        linear, settled, last = None, None, len(levels) - 1
         for step, (sigma_m, level) in enumerate(zip(sigmas_m, levels, strict=True)):
             if level == settled and step < last:
                 continue
@@ -101,10 +104,12 @@ class Refiner:
             if linear is None:
                 return None
             before, T_cam_obj = T_cam_obj, moved(T_cam_obj, linear.matrix, linear.vector)
-            refined = Refined(T_cam_obj, linear.matrix, linear.residual_m, linear.aligned)
-            moved_m = before.distance_to_m(T_cam_obj) + before.angle_to_rad(T_cam_obj) * self._diameter_m / 2
-            settled = level if moved_m < config.settled * self._diameter_m else None
-        return refined
+            moved_m = before.distance_to_m(T_cam_obj) + before.angle_to_rad(T_cam_obj) * self._radius_m
+            settled = level if moved_m < config.settled * self._radius_m else None
+        if linear is None:
+            return None
+        free = free_directions(linear.matrix, self._radius_m)
+        return Refined(T_cam_obj, linear.matrix, free, linear.residual_m, linear.aligned)
 
     def _linearise(
         self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance, sigma_m: float, level: int
