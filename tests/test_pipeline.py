@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from reference.onboard import onboard, read_reference_frames
 from tracker.appearance import ViewAppearance
@@ -224,6 +225,20 @@ def test_the_same_frames_give_the_same_poses(can_model: ConceptModel, can_frames
         assert a.covariance is not None
         assert b.covariance is not None
         assert np.array_equal(a.covariance, b.covariance)
+
+
+def test_one_thread_or_two_give_the_same_poses(can_model: ConceptModel, can_frames: list[Frame]) -> None:
+    before, found = torch.get_num_threads(), []
+    try:
+        for threads in (1, 2):
+            torch.set_num_threads(threads)
+            found.append(tracked(can_model, can_frames[:2], TrackerConfig(prior=False)))
+    finally:
+        torch.set_num_threads(before)
+    for one, two in zip(*found, strict=True):
+        assert one.pose is not None
+        assert two.pose is not None
+        assert np.allclose(one.pose.matrix, two.pose.matrix, rtol=0, atol=1e-6)
 
 
 def test_another_seed_of_the_search_finds_the_same_can(

@@ -96,6 +96,44 @@ def test_a_motion_of_the_cloud_moves_the_pose_alike(seed: int, motion: Pose) -> 
 
 
 @settings(max_examples=15)
+@given(SEEDS, poses())
+def test_a_motion_of_the_model_is_taken_back(seed: int, motion: Pose) -> None:
+    pairs, cloud, model = problem(seed, right=0.4)
+    elsewhere = replace(model, points=motion @ model.points, normals=model.normals @ motion.rotation.T)
+    found, moved = (candidates((pairs, cloud, m), QUICK)[0] for m in (model, elsewhere))
+    assert apart(moved.T_cam_obj @ motion, found.T_cam_obj) < 1e-4
+    assert moved.inlier_share == pytest.approx(found.inlier_share)
+
+
+@settings(max_examples=15)
+@given(SEEDS, st.sampled_from([1e-3, 0.1, 25.4, 1000.0]))
+def test_another_unit_of_length_scales_the_translation_alone(seed: int, unit: float) -> None:
+    pairs, cloud, model = problem(seed, right=0.4)
+    larger = (
+        replace(cloud, points=cloud.points * unit),
+        replace(model, points=model.points * unit, diameter_m=unit / 5),
+    )
+    config = QUICK.model_copy(update={"threshold_m": QUICK.threshold_m * unit})
+    found, scaled = candidates((pairs, cloud, model), QUICK)[0], candidates((pairs, *larger), config)[0]
+    assert scaled.T_cam_obj.angle_to_rad(found.T_cam_obj) < 1e-4
+    assert np.allclose(scaled.T_cam_obj.translation_m / unit, found.T_cam_obj.translation_m, atol=1e-4)
+    assert scaled.inlier_share == pytest.approx(found.inlier_share)
+
+
+def test_one_thread_or_two_and_the_same_seed_give_the_same_pose_to_the_bit() -> None:
+    given_, before = problem(3, right=0.1, count=3000), torch.get_num_threads()
+    found = []
+    try:
+        for threads in (1, 2, 2):
+            torch.set_num_threads(threads)
+            found.append(candidates(given_)[0].T_cam_obj.matrix)
+    finally:
+        torch.set_num_threads(before)
+    assert np.array_equal(found[0], found[1])
+    assert np.array_equal(found[1], found[2])
+
+
+@settings(max_examples=15)
 @given(SEEDS)
 def test_the_order_of_the_correspondences_does_not_matter_but_for_the_sampling(seed: int) -> None:
     pairs, cloud, model = problem(seed, right=0.3)
