@@ -29,7 +29,7 @@ ORDER = {
         "errors", "geometry", "frame", "sources", "view", "saliency", "cloud", "region", "reference_views",
         "grounding", "symmetry", "declared_symmetry", "concept", "measures", "matching", "appearance",
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
-        "verification", "refinement", "pose_filter", "config", "result", "stopwatch", "pipeline", "output",
+        "verification", "refinement", "pose_filter", "config", "result", "stopwatch", "search", "pipeline", "output",
         "viewer", "terminal", "__main__",
     ),
     "reference": (

@@ -5,28 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 from reference.onboard import onboard, read_reference_frames
-from tracker.appearance import ViewAppearance
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import ConfigError, FrameError, ModelError
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
-from tracker.pipeline import ObjectTracker, _Hypothesis, _preferred
-from tracker.refinement import Refined
-from tracker.registration import Candidate, register
+from tracker.pipeline import ObjectTracker
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources.synthetic import SyntheticScene, open_scene
-from tracker.verification import NOTHING_SEEN, Evidence, Verifier
-from tracker.view import ObjectView
 
 CAN = "soup_can"
 WITHOUT_PRIOR = TrackerConfig(prior=False)
@@ -349,53 +343,3 @@ def test_of_poses_that_a_symmetry_makes_one_the_nearest_to_the_prediction_is_rep
     assert len(told) == len(can_frames)
     needed = parse_symmetry("z:inf").nearest(truth[-1], truth[0]).angle_to_rad(truth[0])
     assert told[0].angle_to_rad(told[-1]) < needed + np.radians(3) < truth[0].angle_to_rad(truth[-1]) - np.radians(3)
-
-
-def test_candidates_that_a_symmetry_makes_one_are_verified_once(
-    can_model: ConceptModel, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    verified: list[Pose] = []
-
-    def one_and_its_turns(*arguments: Any) -> list[Candidate]:
-        best = register(*arguments)[0]
-        return [replace(best, T_cam_obj=turned) for turned in parse_symmetry("z:60").equivalents(best.T_cam_obj)]
-
-    def verify(self: Verifier, pose: Pose, view: ObjectView, appearance: ViewAppearance) -> Evidence:
-        verified.append(pose)
-        return usual(self, pose, view, appearance)
-
-    usual = Verifier.__call__
-    monkeypatch.setattr("tracker.pipeline.register", one_and_its_turns)
-    monkeypatch.setattr(Verifier, "__call__", verify)
-    for symmetry, distinct in (("none", 6), ("z:120", 2), ("z:60", 1), ("z:inf", 1)):
-        verified.clear()
-        config = TrackerConfig(prior=False, verified=1)
-        (result,) = tracked(replace(can_model, symmetry=parse_symmetry(symmetry)), can_frames[:1], config)
-        assert result.pose is not None
-        assert len(verified) == distinct + 1  # that one again, refined
-
-
-@pytest.mark.parametrize(
-    ("expected", "elsewhere", "chosen"),
-    [
-        (0.5, 0.55, "prediction"),  # hardly better: objects seldom jump
-        (0.5, 0.65, "search"),
-        (0.2, 0.22, "search"),  # the expected pose is not acceptable, so nothing speaks for it
-        (0.2, 0.15, "prediction"),
-        (None, 0.3, "search"),
-        (0.5, None, "prediction"),
-    ],
-)
-def test_a_pose_found_elsewhere_has_to_be_clearly_better(
-    expected: float | None, elsewhere: float | None, chosen: str
-) -> None:
-    def found(score: float | None, origin: str) -> _Hypothesis | None:
-        if score is None:
-            return None
-        refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
-        return _Hypothesis(refined, replace(NOTHING_SEEN, score=score), origin)
-
-    config = TrackerConfig(accept=0.25, jump=0.1)
-    best = _preferred(found(expected, "prediction"), found(elsewhere, "search"), config)
-    assert best is not None
-    assert best.origin == chosen

@@ -10,24 +10,21 @@ from typing import Any
 
 import numpy as np
 import small_gicp
-import torch
 
 from reference.onboard import onboard
-from tracker.appearance import ViewAppearance, view_appearance
-from tracker.closest_points import ClosestPoints
 from tracker.cloud import CloudConfig, PointCloud, lift
 from tracker.concept import ARRAYS, ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import PosedFrame
 from tracker.geometry import Pose
-from tracker.matching import Matcher, MatchingConfig
+from tracker.matching import MatchingConfig
 from tracker.refinement import RefinementConfig, Refiner
-from tracker.registration import register
 from tracker.saliency import Query, open_backend
 from tracker.saliency.attributes import TERMS
+from tracker.search import Search, Sight
 from tracker.sources.synthetic import open_scene
-from tracker.verification import Verifier
-from tracker.view import ObjectView, ViewConfig, view_object
+from tracker.stopwatch import Stopwatch
+from tracker.view import ViewConfig, view_object
 
 SCENE, OBJECT = "turn?object=tea_box&noise=0", "tea_box"
 REFERENCES, FRAMES = (0, 20, 40), (8, 12, 16, 28, 32)
@@ -38,10 +35,8 @@ FINE = ViewConfig(pixels_across=150)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Sight:
-    view: ObjectView
-    cloud: PointCloud
-    appearance: ViewAppearance
+class _Sighting:
+    sight: Sight
     truth: Pose
 
 
@@ -59,57 +54,34 @@ def whole_pose() -> dict[str, Any]:
     model = _thinned(onboard([posed(k) for k in REFERENCES], backend, FINE, vocabulary=labels))
     sights = [_seen(posed(k), model, labels) for k in FRAMES]
     config = TrackerConfig(view=FINE, matching=MatchingConfig(query_points=POINTS))
-    search = _Search(model, config)
+    search = Search(model, config)
     refine = Refiner(model, RefinementConfig(model_points=REFINED_POINTS), FINE.pixels_across)
-    starts = [sight.truth.nudged(_off(k)) for k, sight in enumerate(sights)]
+    starts = [seen.truth.nudged(_off(k)) for k, seen in enumerate(sights)]
     tree = small_gicp.preprocess_points(model.points, downsampling_resolution=GRID_M)
 
-    def gicp(sight: _Sight, start: Pose) -> Pose:
+    def from_scratch(sight: Sight, _: Pose) -> Pose:
+        found = search(sight, None, Stopwatch())
+        return found.refined.T_cam_obj if found else Pose.identity()
+
+    def gicp(sight: Sight, start: Pose) -> Pose:
         cloud, _ = small_gicp.preprocess_points(sight.cloud.points, downsampling_resolution=GRID_M)
         result = small_gicp.align(tree[0], cloud, tree[1], start.inverse().matrix, registration_type="GICP")
         return Pose.from_matrix(result.T_target_source).inverse()
 
-    def refined(sight: _Sight, start: Pose) -> Pose:
+    def refined(sight: Sight, start: Pose) -> Pose:
         found = refine(start, sight.view, sight.appearance)
         return found.T_cam_obj if found else start
 
-    from_scratch = _timed(lambda sight, _: search(sight), sights, starts)
+    whole = _timed(from_scratch, sights, starts)
     refinement = _timed(refined, sights, starts)
     return {
-        "global_pose_ms": from_scratch["ms"],
-        "global_pose": from_scratch,
+        "global_pose_ms": whole["ms"],
+        "global_pose": whole,
         "refinement_ms": refinement["ms"],
         "refinement": refinement,
         "refinement_gicp": _timed(gicp, sights, starts),
-        "global_pose_points": [POINTS, min(len(sight.cloud) for sight in sights)],
+        "global_pose_points": [POINTS, min(len(seen.sight.cloud) for seen in sights)],
     }
-
-
-class _Search:
-    """The tracker's global search: match, register, verify, and refine the best."""
-
-    def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
-        self._model, self._config = model, config
-        across = config.view.pixels_across
-        self._match = Matcher(model, config.matching, config.torch_device)
-        self._closest = ClosestPoints(model, config.closest_points)
-        self._refine = Refiner(model, config.refinement, across)
-        self._verify = Verifier(model, config.verification, across)
-
-    def __call__(self, sight: _Sight) -> Pose:
-        config = self._config
-        generator = torch.Generator(config.torch_device).manual_seed(config.seed)
-        pairs = self._match(sight.cloud)
-        candidates = register(pairs, sight.cloud, self._model, config.registration, generator)
-        rough = [(self._verify(c.T_cam_obj, sight.view, sight.appearance).score, c.T_cam_obj) for c in candidates]
-        rough.sort(key=lambda scored: -scored[0])
-        best, best_score = Pose.identity(), -1.0
-        for _, pose in rough[: config.verified]:
-            closer = self._closest.align(pose, sight.cloud)
-            found = self._refine(closer, sight.view, sight.appearance) if closer else None
-            if found and (score := self._verify(found.T_cam_obj, sight.view, sight.appearance).score) > best_score:
-                best, best_score = found.T_cam_obj, score
-        return best
 
 
 def _thinned(model: ConceptModel) -> ConceptModel:
@@ -118,13 +90,13 @@ def _thinned(model: ConceptModel) -> ConceptModel:
     return replace(model, **{name: getattr(model, name)[kept] for name in of_points})
 
 
-def _seen(posed: PosedFrame, model: ConceptModel, labels: tuple[str, ...]) -> _Sight:
+def _seen(posed: PosedFrame, model: ConceptModel, labels: tuple[str, ...]) -> _Sighting:
     view = view_object(posed.frame, posed.mask, model.diameter_m, FINE)
     assert view is not None, "the object is in view in all frames"  # noqa: S101
     cloud = lift(view, open_backend("attributes")([Query(view, labels)])[0], CloudConfig())
     kept = np.linspace(0, len(cloud) - 1, min(POINTS, len(cloud))).round().astype(int)
     parts = (cloud.points, cloud.normals, cloud.colours, cloud.saliency)
-    return _Sight(view, PointCloud(*(part[kept] for part in parts)), view_appearance(view), posed.T_cam_obj)
+    return _Sighting(Sight.of(view, PointCloud(*(part[kept] for part in parts))), posed.T_cam_obj)
 
 
 def _off(seed: int) -> np.ndarray:
@@ -133,14 +105,14 @@ def _off(seed: int) -> np.ndarray:
     return np.concatenate((turn, shift * SHIFT_M / np.linalg.norm(shift)))
 
 
-def _timed(way: Callable[[_Sight, Pose], Pose], sights: list[_Sight], starts: list[Pose]) -> dict[str, float]:
-    way(sights[0], starts[0])
+def _timed(way: Callable[[Sight, Pose], Pose], sights: list[_Sighting], starts: list[Pose]) -> dict[str, float]:
+    way(sights[0].sight, starts[0])
     spent, degrees, millimetres = [], [], []
-    for sight, start in list(zip(sights, starts, strict=True)) * 2:
+    for seen, start in list(zip(sights, starts, strict=True)) * 2:
         began = time.perf_counter()
-        found = way(sight, start)
+        found = way(seen.sight, start)
         spent.append(time.perf_counter() - began)
-        degrees.append(float(np.degrees(found.angle_to_rad(sight.truth))))
-        millimetres.append(found.distance_to_m(sight.truth) * 1e3)
+        degrees.append(float(np.degrees(found.angle_to_rad(seen.truth))))
+        millimetres.append(found.distance_to_m(seen.truth) * 1e3)
     medians = [statistics.median(values) for values in (spent, degrees, millimetres)]
     return {"ms": medians[0] * 1e3, "degrees": medians[1], "mm": medians[2]}

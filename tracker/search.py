@@ -1,0 +1,129 @@
+"""Where is it? One object's stages from the correspondences of a frame to a pose with its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+
+from tracker.appearance import ViewAppearance, view_appearance
+from tracker.closest_points import ClosestPoints
+from tracker.cloud import PointCloud
+from tracker.concept import ConceptModel
+from tracker.config import TrackerConfig
+from tracker.geometry import Pose
+from tracker.matching import Correspondences, Matcher
+from tracker.refinement import Refined, Refiner
+from tracker.registration import Candidate, register
+from tracker.stopwatch import Stopwatch
+from tracker.verification import Evidence, Verifier
+from tracker.view import ObjectView
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """What one frame shows of an object."""
+
+    view: ObjectView
+    cloud: PointCloud
+    appearance: ViewAppearance
+
+    @classmethod
+    def of(cls, view: ObjectView, cloud: PointCloud) -> Sight:
+        return cls(view, cloud, view_appearance(view))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypothesis:
+    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction or search."""
+
+    refined: Refined
+    evidence: Evidence
+    origin: str
+
+
+class Search:
+    """Finds one object in what frames show of it. It remembers nothing from frame to frame."""
+
+    def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
+        self._model, self._config = model, config
+        self._device = config.torch_device
+        self._match = Matcher(model, config.matching, self._device)
+        self._closest = ClosestPoints(model, config.closest_points)
+        self._refine = Refiner(model, config.refinement, config.view.pixels_across)
+        self._verify = Verifier(model, config.verification, config.view.pixels_across)
+
+    def __call__(self, sight: Sight, predicted: Pose | None, clock: Stopwatch) -> Hypothesis | None:
+        """The pose that explains best what is seen; None where none does at all."""
+        # Which of the cloud's points is which point of the model?
+        with clock("matching"):
+            correspondences = self._match(sight.cloud)
+
+        # Is it where it was expected? If not clearly so: where do the correspondences agree that it is?
+        found = None if predicted is None else self._near(predicted, sight, correspondences, clock)
+        if found is None or found.evidence.score < self._config.trust:
+            found = preferred(found, self._anywhere(sight, correspondences, clock), self._config)
+        return found
+
+    def _near(
+        self, predicted: Pose, sight: Sight, correspondences: Correspondences, clock: Stopwatch
+    ) -> Hypothesis | None:
+        """The better of two poses near the prediction: by surfaces alone, and pulled by the concepts first."""
+        with clock("closest points"):
+            pulled = self._closest.align(self._closest.pull(predicted, correspondences, sight.cloud), sight.cloud)
+            direct = self._closest.align(predicted, sight.cloud)
+        found = self._refined(pulled, sight, "concepts", clock)
+        if direct and pulled and self._alike(direct, pulled):
+            return found
+        return better(self._refined(direct, sight, "prediction", clock), found)
+
+    def _alike(self, a: Pose, b: Pose) -> bool:
+        """So near that refinement brings them to the same pose."""
+        return a.angle_to_rad(b) < 0.03 and a.distance_to_m(b) < 0.01 * self._model.diameter_m
+
+    def _anywhere(self, sight: Sight, correspondences: Correspondences, clock: Stopwatch) -> Hypothesis | None:
+        """The best of the poses on which correspondences agree, wherever that is."""
+        with clock("registration"):
+            generator = torch.Generator(self._device).manual_seed(self._config.seed)
+            candidates = register(correspondences, sight.cloud, self._model, self._config.registration, generator)
+            candidates = self._inequivalent(candidates)
+        with clock("verification"):
+            rough = [(self._verify(c.T_cam_obj, sight.view, sight.appearance).score, c) for c in candidates]
+            rough.sort(key=lambda scored: -scored[0])
+        best = None
+        for _, candidate in rough[: self._config.verified]:
+            with clock("closest points"):
+                closer = self._closest.align(candidate.T_cam_obj, sight.cloud)
+            best = better(best, self._refined(closer, sight, "search", clock))
+        return best
+
+    def _inequivalent(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Those that the object's symmetry does not make the same as a better supported one."""
+        alike = self._config.registration
+        poses, distance_m = [c.T_cam_obj for c in candidates], alike.distinct_share * self._model.diameter_m
+        return [candidates[k] for k in self._model.symmetry.distinct(poses, alike.distinct_rad, distance_m)]
+
+    def _refined(self, T_start: Pose | None, sight: Sight, origin: str, clock: Stopwatch) -> Hypothesis | None:
+        if T_start is None:
+            return None
+        with clock("refinement"):
+            refined = self._refine(T_start, sight.view, sight.appearance)
+        if refined is None:
+            return None
+        with clock("verification"):
+            return Hypothesis(refined, self._verify(refined.T_cam_obj, sight.view, sight.appearance), origin)
+
+
+def preferred(expected: Hypothesis | None, elsewhere: Hypothesis | None, config: TrackerConfig) -> Hypothesis | None:
+    """The expected pose, unless it is not acceptable or the one found elsewhere is clearly better."""
+    if expected is None or elsewhere is None or expected.evidence.score < config.accept:
+        return better(expected, elsewhere)
+    return elsewhere if elsewhere.evidence.score > expected.evidence.score + config.jump else expected
+
+
+def better(a: Hypothesis | None, b: Hypothesis | None) -> Hypothesis | None:
+    """The one with the higher score, the first of equals."""
+    if a is None or b is None:
+        return a or b
+    return a if a.evidence.score >= b.evidence.score else b
