@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reference.viewsphere import farthest_point_sampling, icosphere_directions, nearest_direction
+from reference.viewsphere import icosphere_directions, nearest_direction, widest_sampling
 from tracker.errors import OnboardingError
 from tracker.geometry import Floats
 from tracker.sources import Sighting
 
 SUBDIVISIONS = 3  # 642 directions, 4 to 5 degrees apart: finer differences of view do not matter
-LEAST_VISIBLE_SHARE = 0.6  # of the best visible frame's visible fraction: a hidden side teaches nothing
+LEAST_VISIBLE_SHARE = 0.3  # of the best visible frame's visible fraction: less of it teaches next to nothing
 LEAST_VISIBLE_PX = 400
 
 
@@ -26,8 +26,9 @@ def choose_reference_frames(sightings: Sequence[Sighting], count: int) -> list[S
     """Up to count sightings that see the object well and from directions as different as can be.
 
     Viewing directions in the object's frame are snapped to an icosphere; of the frames at one direction the best
-    visible counts; farthest-point sampling starts at the best visible frame of all. Deterministic: ties go to the
-    lower index. Raises OnboardingError if no frame shows the object well enough.
+    visible counts. Farthest-point sampling from every direction is tried, and the widest set is taken; an angle counts
+    as much as is visible there, as a half hidden view teaches half. Deterministic: ties go to the better visible, then
+    to the lower index. Raises OnboardingError if no frame shows the object well enough.
     """
     best_fraction = max((s.visible_fraction for s in sightings), default=0.0)
     usable = [
@@ -44,9 +45,7 @@ def choose_reference_frames(sightings: Sequence[Sighting], count: int) -> list[S
     usable.sort(key=lambda s: (-s.visible_px, s.index))
     sphere = icosphere_directions(SUBDIVISIONS)
     nodes = nearest_direction(np.stack([view_direction(s) for s in usable]), sphere)
-    occupied, first = np.unique(nodes, return_index=True)  # first = the best visible frame at each direction
-    order = np.argsort([usable[i].index for i in first], kind="stable")
-    occupied, first = occupied[order], first[order]
-    seed = int(np.flatnonzero(first == 0)[0])
-    picked = farthest_point_sampling(sphere[occupied], count, seed)
+    first = np.sort(np.unique(nodes, return_index=True)[1])  # the best visible frame at each direction, best first
+    worth = np.array([usable[i].visible_fraction for i in first]) / best_fraction
+    picked = widest_sampling(sphere[nodes[first]], count, worth)
     return [usable[int(first[i])] for i in picked]

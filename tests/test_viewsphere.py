@@ -8,7 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from reference.viewsphere import farthest_point_sampling, icosphere_directions, nearest_direction
+from reference.viewsphere import (
+    farthest_point_sampling,
+    icosphere_directions,
+    nearest_direction,
+    widest_sampling,
+)
 from tracker.geometry import Floats
 
 
@@ -93,3 +98,17 @@ def test_directions_that_differ_by_a_hair_are_told_apart() -> None:
     hair_rad = 3e-6
     among = np.array([[np.sin(k * hair_rad), 0, np.cos(k * hair_rad)] for k in range(4)])
     assert farthest_point_sampling(among, 3, 0) == [0, 3, 1]
+
+
+def test_an_angle_counts_as_much_as_its_direction_is_worth() -> None:
+    fan = np.array([[np.cos(a), np.sin(a), 0] for a in np.radians((0, 30, 70))])
+    assert farthest_point_sampling(fan, 2, 0) == [0, 2]
+    assert farthest_point_sampling(fan, 2, 0, np.array([1, 1, 0.4])) == [0, 1]
+
+
+def test_the_widest_sampling_does_not_begin_in_the_middle_unless_one_is_wanted() -> None:
+    fan = np.array([[np.cos(a), np.sin(a), 0] for a in np.radians((0, -40, -20, 20, 40))])
+    assert sorted(widest_sampling(fan, 2, np.ones(5))) == [1, 4]
+    assert widest_sampling(fan, 1, np.ones(5)) == [0]
+    assert sorted(widest_sampling(fan, 3, np.ones(5))) == [0, 1, 4]
+    assert sorted(widest_sampling(fan, 2, np.array([1, 0.2, 1, 1, 1]))) == [2, 4]
