@@ -152,3 +152,31 @@ def test_a_damaged_pose_is_named_by_its_file(tmp_path: Path, content: str, compl
     (write(tmp_path, ["0"], posed=["0"]) / "annotated_poses" / "0.txt").write_text(content)
     with pytest.raises(SourceError, match=complaint):
         Folder(tmp_path).sightings("object")
+
+
+def test_poses_and_masks_that_are_counted_belong_to_the_pictures_by_order(tmp_path: Path) -> None:
+    write(tmp_path, ["a", "b", "c"], posed=["a", "b", "c"])
+    cv2.imwrite(str(tmp_path / "masks" / "b.png"), np.zeros((36, 48), np.uint8))
+    for name in ("annotated_poses", "masks"):
+        for k, file in enumerate(sorted((tmp_path / name).iterdir())):
+            file.rename(file.with_stem(str(9 + k)))  # 9, 10, 11: by value, not by letter
+    (tmp_path / "annotated_poses" / "10.txt").write_text(POSE.replace("0.7", "0.8"))
+    source = Folder(tmp_path)
+    assert [s.T_cam_obj.translation_m[2] for s in source.sightings("object")] == [0.7, 0.8, 0.7]
+    assert [s.visible_px for s in source.sightings("object")] == [50, 0, 50]
+    (tmp_path / "annotated_poses" / "11.txt").unlink()
+    with pytest.raises(
+        SourceError, match=r"annotated_poses has 2 files 9\.txt \.\. 10\.txt, expected the names of the 3"
+    ):
+        Folder(tmp_path)
+
+
+def test_annotated_masks_come_before_computed_ones_and_the_object_has_the_name_it_is_given(tmp_path: Path) -> None:
+    write(tmp_path, ["0", "1"], posed=["0", "1"])
+    (tmp_path / "gt_mask").mkdir()
+    cv2.imwrite(str(tmp_path / "gt_mask" / "1.png"), np.full((36, 48), 255, np.uint8))
+    source = Folder(tmp_path, "mug", "kitchen")
+    assert [(s.index, s.visible_px) for s in source.sightings("mug")] == [(1, 36 * 48)]
+    assert (source.visible_px(0), source.visible_px(1)) == (None, 36 * 48)
+    assert (source.pose(0) is None, source.object_ids, source.name) == (False, ("mug",), "kitchen")
+    assert list(source[1].masks) == ["mug"]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from tracker.errors import SourceError
-from tracker.sources.image_files import read_depth_m, read_mask, read_rgb
+from tracker.sources.image_files import read_depth_m, read_labels, read_mask, read_rgb
 
 RGB = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)
 
@@ -107,3 +107,22 @@ def test_what_is_no_picture_or_not_there_is_named(tmp_path: Path) -> None:
     (tmp_path / "empty.bmp").touch()
     with pytest.raises(SourceError, match=r"empty\.bmp: not a picture that can be decoded \(0 bytes\)"):
         read_rgb(tmp_path / "empty.bmp")
+
+
+def test_depth_that_is_packed_into_colours_is_read_where_it_may_be(tmp_path: Path) -> None:
+    depth_mm = np.array([[0, 1, 255], [256, 843, 65_535]])
+    packed = np.dstack((depth_mm % 256, depth_mm // 256, np.full_like(depth_mm, 9))).astype(np.uint8)
+    path = write(tmp_path / "a.png", packed, colours="rgb")
+    assert np.allclose(read_depth_m(path, 0.001, packed=True), depth_mm / 1000)
+    with pytest.raises(SourceError, match="one channel of 16 bits"):
+        read_depth_m(path, 0.001)
+    plain = write(tmp_path / "b.png", depth_mm.astype(np.uint16))
+    assert np.allclose(read_depth_m(plain, 0.001, packed=True), depth_mm / 1000)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_labels_are_the_stored_numbers_of_the_one_channel_or_of_red(tmp_path: Path, dtype: type[np.integer]) -> None:
+    labels = np.array([[0, 1], [21, 255]], dtype)
+    assert read_labels(write(tmp_path / "a.png", labels)).tolist() == labels.tolist()
+    red = np.dstack((labels, np.full_like(labels, 7), np.full_like(labels, 9)))
+    assert read_labels(write(tmp_path / "b.png", red, colours="rgb")).tolist() == labels.tolist()

@@ -105,11 +105,35 @@ def _synthetic(argument: str) -> Dataset:
     return open_synthetic(argument)
 
 
-DATASETS: dict[str, Callable[[str], Dataset]] = {"bop": _bop, "synthetic": _synthetic}
+def _ycb_video(argument: str) -> Dataset:
+    from eval.datasets.ycb_video import YcbVideoDataset
+
+    return YcbVideoDataset(argument)
+
+
+def _nocs(argument: str) -> Dataset:
+    from eval.datasets.nocs import NocsDataset
+
+    return NocsDataset(argument)
+
+
+def _ycbineoat(argument: str) -> Dataset:
+    from eval.datasets.ycbineoat import YcbInEoatDataset
+
+    return YcbInEoatDataset(argument)
+
+
+DATASETS: dict[str, Callable[[str], Dataset]] = {
+    "bop": _bop,
+    "synthetic": _synthetic,
+    "ycb-video": _ycb_video,
+    "nocs": _nocs,
+    "ycbineoat": _ycbineoat,
+}
 
 
 def open_dataset(name: str) -> Dataset:
-    """`bop:PATH` or `synthetic:NAME[?options]` -> the dataset. Raises SourceError where it cannot be one."""
+    """`KIND:PATH` or `synthetic:NAME[?options]` -> the dataset. Raises SourceError where it cannot be one."""
     kind, separator, argument = name.partition(":")
     if kind not in DATASETS or not separator or not argument:
         raise SourceError(f"{name!r} is not a dataset; expected KIND:ARGUMENT with KIND one of {', '.join(DATASETS)}")

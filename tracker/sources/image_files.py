@@ -12,6 +12,7 @@ from tracker.errors import SourceError
 
 PNG_END = b"IEND\xaeB`\x82"
 JPEG_END = b"\xff\xd9"
+GREEN, RED = 1, 2  # channels as OpenCV reads them
 
 
 def read_rgb(path: Path) -> npt.NDArray[np.uint8]:
@@ -21,14 +22,17 @@ def read_rgb(path: Path) -> npt.NDArray[np.uint8]:
     return np.ascontiguousarray(bgr[:, :, ::-1])
 
 
-def read_depth_m(path: Path, metres_per_unit: float) -> npt.NDArray[np.float32]:
+def read_depth_m(path: Path, metres_per_unit: float, *, packed: bool = False) -> npt.NDArray[np.float32]:
     """(H, W) float32 metres from a single-channel integer picture, 0 where there is none.
 
+    packed: where the picture is of colours of 8 bits, green is the high byte and red the low one, as NOCS packs them.
     Raises SourceError if the scale is not positive: some recordings read back 0.
     """
     if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
         raise SourceError(f"{path}: the depth scale must be positive, got {metres_per_unit:g} metres per unit")
     raw = _decode(path, cv2.IMREAD_UNCHANGED)
+    if packed and raw.ndim == 3 and raw.dtype == np.uint8:
+        raw = raw[:, :, GREEN].astype(np.uint16) * 256 + raw[:, :, RED]
     if raw.ndim != 2 or raw.dtype not in (np.uint8, np.uint16):
         raise SourceError(f"{path}: a depth picture has one channel of 16 bits, got {raw.dtype} {raw.shape}")
     return raw.astype(np.float32) * np.float32(metres_per_unit)
@@ -38,6 +42,15 @@ def read_mask(path: Path) -> npt.NDArray[np.bool_]:
     """(H, W) bool: any value or colour but 0 is the object, whatever the transparency."""
     raw = _decode(path, cv2.IMREAD_UNCHANGED)
     return np.asarray(raw if raw.ndim == 2 else raw[:, :, :3].max(axis=2)) > 0
+
+
+def read_labels(path: Path) -> npt.NDArray[np.integer]:
+    """(H, W) whole numbers as they are stored: of the one channel, of the red one where the picture is of colours."""
+    raw = _decode(path, cv2.IMREAD_UNCHANGED)
+    labels = raw if raw.ndim == 2 else raw[:, :, RED]
+    if not np.issubdtype(labels.dtype, np.integer):
+        raise SourceError(f"{path}: a picture of labels holds whole numbers, got {labels.dtype}")
+    return labels
 
 
 def _decode(path: Path, flag: int) -> npt.NDArray:
