@@ -24,7 +24,7 @@ class Track:
     """Make few-shot models from each scene's own frames, track all its frames in order, and score the poses."""
 
     dataset: str
-    """bop:PATH or synthetic:NAME."""
+    """bop:PATH, ycb-video:PATH, nocs:PATH, ycbineoat:PATH or synthetic:NAME."""
     scenes: tuple[int, ...] | None = None
     """Only these scenes."""
     objects: tuple[str, ...] | None = None
@@ -131,7 +131,7 @@ class Score:
     """Score a BOP result file."""
 
     dataset: str
-    """bop:PATH or synthetic:NAME."""
+    """bop:PATH, ycb-video:PATH, nocs:PATH, ycbineoat:PATH or synthetic:NAME."""
     results: Path
     """The csv: scene_id,im_id,obj_id,score,R,t,time."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None

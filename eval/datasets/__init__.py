@@ -93,6 +93,18 @@ def require(kind: str, asked: object, available: Sequence[object], dataset: str)
         raise SourceError(f"{dataset} has no {kind} {asked!r}; it has {', '.join(map(str, available)) or 'none'}")
 
 
+def number_of(object_id: str, names: Sequence[str], dataset: str) -> int:
+    """The object's place in the names, from 1. Raises SourceError where it has none."""
+    require("object", object_id, names, dataset)
+    return names.index(object_id) + 1
+
+
+def name_of(number: int, names: Sequence[str], dataset: str) -> str:
+    """Inverse of `number_of`."""
+    require("object number", number, range(1, len(names) + 1), dataset)
+    return names[number - 1]
+
+
 def _bop(argument: str) -> Dataset:
     from eval.datasets.bop import BopDataset
 

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from eval.datasets import ObjectModel, Target, require
+from eval.datasets import ObjectModel, Target, name_of, number_of, require
 from eval.datasets.labelled_scene import Annotation, ImageFiles, LabelledScene
 from eval.datasets.model_files import read_model
 from tracker.errors import SourceError
@@ -105,12 +105,10 @@ class NocsDataset:
         return model
 
     def number(self, object_id: str) -> int:
-        require("object", object_id, self.object_ids, self.name)
-        return self.object_ids.index(object_id) + 1
+        return number_of(object_id, self.object_ids, self.name)
 
     def object_with(self, number: int) -> str:
-        require("object number", number, range(1, len(self.object_ids) + 1), self.name)
-        return self.object_ids[number - 1]
+        return name_of(number, self.object_ids, self.name)
 
     @cached_property
     def _classes(self) -> dict[str, int]:

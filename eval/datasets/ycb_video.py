@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.io import loadmat
 
-from eval.datasets import ObjectModel, Target, require
+from eval.datasets import ObjectModel, Target, name_of, number_of, require
 from eval.datasets.labelled_scene import Annotation, ImageFiles, LabelledScene
 from eval.datasets.model_files import read_model
 from eval.datasets.ycb_objects import YCB_VIDEO_CLASSES, YCB_VIDEO_FRAME, is_symmetric, shape_files
@@ -82,12 +82,10 @@ class YcbVideoDataset:
         return read_model(shape_files(self._path / "models", object_id), is_symmetric(object_id))
 
     def number(self, object_id: str) -> int:
-        require("object", object_id, self.object_ids, self.name)
-        return self.object_ids.index(object_id) + 1
+        return number_of(object_id, self.object_ids, self.name)
 
     def object_with(self, number: int) -> str:
-        require("object number", number, range(1, len(self.object_ids) + 1), self.name)
-        return self.object_ids[number - 1]
+        return name_of(number, self.object_ids, self.name)
 
 
 def _read_classes(path: Path) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from eval.datasets import ObjectModel, Target, require
+from eval.datasets import ObjectModel, Target, number_of, require
 from eval.datasets.model_files import read_model
 from eval.datasets.ycb_objects import YCB_VIDEO_CLASSES, YCB_VIDEO_FRAME, is_symmetric, shape_files
 from tracker.errors import SourceError
@@ -85,7 +85,7 @@ class YcbInEoatDataset:
 
     def number(self, object_id: str) -> int:
         require("object", object_id, self.object_ids, self.name)
-        return self._numbered.index(object_id) + 1
+        return number_of(object_id, self._numbered, self.name)
 
     def object_with(self, number: int) -> str:
         numbers = {self.number(object_id): object_id for object_id in self.object_ids}
