@@ -29,6 +29,10 @@ class Track:
     """Only these scenes."""
     objects: tuple[str, ...] | None = None
     """Only these objects."""
+    method: Literal["ours", "sift", "fpfh", "icp", "colored-icp"] = "ours"
+    """Who tracks: this tracker, or another method made of the same models. icp and colored-icp need --init gt."""
+    init: Literal["estimated", "gt"] = "estimated"
+    """gt: tell each object's true pose once a scene, in the first frame where it is visible."""
     backend: str = "attributes"
     """Which saliency backend finds the concepts; "siglip2+attributes" joins two."""
     weights: str | None = None
@@ -60,6 +64,7 @@ class Track:
 
         from eval.bop_results import write_results
         from eval.datasets import open_dataset
+        from eval.peers import method_kind
         from eval.predict import Protocol, track_dataset
         from eval.report import environment, table, write_html, write_scores
         from eval.score import score
@@ -77,10 +82,11 @@ class Track:
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
+        kind = method_kind(self.method)
         dataset = open_dataset(self.dataset)
         vocabularies = read_vocabulary(self.vocabulary) if self.vocabulary else None
         backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
-        protocol = Protocol(backend, config, self.views, self.poses, vocabularies)
+        protocol = Protocol(backend, config, self.views, self.poses, vocabularies, self.method, self.init)
         scene_ids = dataset.scene_ids if self.scenes is None else self.scenes
         with ExitStack() as stack:
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
@@ -99,14 +105,11 @@ class Track:
                 object_ids=self.objects,
                 exclude=tracked.reference_frames,
                 protocol={
-                    "backend": f"{backend.name} ({backend.fingerprint})",
-                    "weights": backend.weights,
-                    "vocabulary": self.vocabulary or "the backend's own",
+                    "method": self.method,
+                    **kind.stated(config, backend, self.vocabulary, self.init),
                     "views": self.views,
                     "masks": "the dataset's visible masks",
-                    "prior": "on" if config.prior else "off",
-                    "initialisation": "estimated: no true pose is given after onboarding",
-                    "reinitialisation": "by the tracker itself, never from the truth",
+                    "reinitialisation": "by the method itself, never from the truth",
                     "poses": self.poses,
                     "models_refused": tracked.refused,
                 },
@@ -119,7 +122,8 @@ class Track:
                 write_scores(folder / "scores.json", scores, extra)
                 write_html(folder / "report.html", scores, extra, f"Tracking {self.dataset}")
                 (folder / "config.yaml").write_text(dump_config(config))
-        STDERR.print(table(scores, f"{self.dataset}, {self.views} views, backend {self.backend}"))
+        who = f"backend {self.backend}" if kind.concepts else f"method {self.method}"
+        STDERR.print(table(scores, f"{self.dataset}, {self.views} views, {who}"))
         if latency_ms:
             STDERR.print(f"an object and frame: median {latency_ms['median']:.1f} ms, p95 {latency_ms['p95']:.1f} ms")
         if self.out:

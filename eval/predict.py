@@ -1,4 +1,7 @@
-"""Loop 1 of an evaluation: run the tracker over a dataset and keep what it said. It sees frames, never the truth."""
+"""Loop 1 of an evaluation: run the tracker, or a peer, over a dataset and keep what it said.
+
+It sees frames, and of the truth at most one pose an object and scene, where the protocol says so.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,15 @@ import numpy as np
 from eval.bop_results import Estimate
 from eval.datasets import Dataset
 from eval.instances import ObjectInImage
+from eval.peers import method_kind, open_method
 from eval.score import TrackingCounts
 from reference.onboard import onboard, read_reference_frames
 from reference.vocabulary import VocabularySet
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
-from tracker.errors import OnboardingError
+from tracker.errors import ConfigError, OnboardingError
 from tracker.frame import Frame
 from tracker.geometry import Pose
-from tracker.pipeline import ObjectTracker
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources import PosedSource
@@ -34,13 +37,26 @@ Progress = Callable[[Iterable[Frame], int, str], Iterable[Frame]]
 @dataclass(frozen=True, slots=True)
 class Protocol:
     """How a dataset is tracked. views: reference frames an object and scene, picked from its own frames.
-    poses: which of a result's poses count. vocabularies: the concepts of each object, None for the backend's own."""
+    poses: which of a result's poses count. vocabularies: the concepts of each object, None for the backend's own.
+    method: "ours", or a peer as `eval.peers` has it. initialisation: "gt" tells the method each object's true pose,
+    once a scene, in the first frame where the object is visible.
+
+    Raises ConfigError where the method does not exist, or cannot do with that initialisation."""
 
     backend: SaliencyBackend
     config: TrackerConfig
     views: int
     poses: Literal["filtered", "raw"] = "filtered"
     vocabularies: VocabularySet | None = None
+    method: str = "ours"
+    initialisation: Literal["estimated", "gt"] = "estimated"
+
+    def __post_init__(self) -> None:
+        start = method_kind(self.method).start
+        if start == "needed" and self.initialisation != "gt":
+            raise ConfigError(f"method {self.method} goes on from a pose that it is told: it needs --init gt")
+        if start == "used" and self.initialisation == "gt" and not self.config.prior:
+            raise ConfigError(f"method {self.method} uses no start with the prior off: --init gt needs --prior on")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,11 +100,15 @@ def track_dataset(
         models = _onboard(dataset, scene_id, wanted, protocol, tracked)
         if not models:
             continue
-        tracker = ObjectTracker(models, protocol.config, protocol.backend)
+        tracker = open_method(protocol.method, models, protocol.config, protocol.backend)
         truth, visible = _truth(source, [model.object_id for model in models])
+        untold = [model.object_id for model in models] if protocol.initialisation == "gt" else []
         shown = viewer(scene_id, models)
         try:
             for frame in progress(source, len(source), f"scene {scene_id}"):
+                for object_id in [o for o in untold if (frame.index, o) in visible]:
+                    tracker.place(object_id, truth[frame.index][object_id], frame.stamp_ns)
+                    untold.remove(object_id)
                 results = tracker.step(frame)
                 shown.show(frame, results, truth[frame.index])
                 seen = [(frame.index, result.object_id) in visible for result in results]

@@ -22,6 +22,8 @@ from tracker.view import ObjectView, view_object
 
 logger = logging.getLogger(__name__)
 
+PLACED_SIGMA_RAD, PLACED_SIGMA_M = 0.1, 0.01  # how surely an object is where `place` says
+
 
 class ObjectTracker:
     """Follows objects through the frames of one camera.
@@ -47,14 +49,35 @@ class ObjectTracker:
             model.require_backend(backend)
         self._backend = backend
         self._tracks = [_Track(model, config) for model in models]
-        self._last_stamp_ns = -1
+        self._prior, self._last_stamp_ns, self._placed_ns = config.prior, -1, -1
+
+    def place(self, object_id: str, T_cam_obj: Pose, stamp_ns: int) -> None:
+        """Tell where an object is, roughly: the next frame looks there first, and elsewhere where it is not there.
+
+        What was known of its motion is forgotten. stamp_ns: of the pose, not before the last frame nor after the next.
+        Raises ConfigError where there is no model of the object or the tracker has no prior, FrameError where the time
+        is past.
+        """
+        tracks = {track.object_id: track for track in self._tracks}
+        if object_id not in tracks:
+            raise ConfigError(f"there is no model of object {object_id!r} to place; there are {', '.join(tracks)}")
+        if not self._prior:
+            raise ConfigError(f"object {object_id!r} cannot be placed: with prior off every frame is searched anew")
+        if not isinstance(stamp_ns, int) or stamp_ns < max(self._last_stamp_ns, 0):
+            raise FrameError(
+                f"the pose of object {object_id!r} is of {stamp_ns!r} ns: expected whole nanoseconds, not before the "
+                f"last frame's {max(self._last_stamp_ns, 0)} ns"
+            )
+        tracks[object_id].place(T_cam_obj, stamp_ns)
+        self._placed_ns = max(self._placed_ns, stamp_ns)
 
     def step(self, frame: Frame) -> tuple[TrackResult, ...]:
         """Every model's result, in their order. Raises FrameError where time does not advance; nothing is lost then."""
-        if frame.stamp_ns <= self._last_stamp_ns:
+        if frame.stamp_ns <= self._last_stamp_ns or frame.stamp_ns < self._placed_ns:
+            before, what = max((self._last_stamp_ns, "the last one"), (self._placed_ns, "the pose that was told"))
             raise FrameError(
                 f"frame {frame.index} of {frame.provenance.source}: its stamp {frame.stamp_ns} ns is not after "
-                f"the last one, {self._last_stamp_ns} ns"
+                f"{what}, {before} ns"
             )
         self._last_stamp_ns = frame.stamp_ns
         clocks = [Stopwatch() for _ in self._tracks]
@@ -91,8 +114,16 @@ class _Track:
         self._state = TrackState.INITIALISING
 
     @property
+    def object_id(self) -> str:
+        return self._model.object_id
+
+    @property
     def labels(self) -> tuple[str, ...]:
         return self._model.labels
+
+    def place(self, T_cam_obj: Pose, stamp_ns: int) -> None:
+        information = np.diag([PLACED_SIGMA_RAD**-2] * 3 + [PLACED_SIGMA_M**-2] * 3)
+        self._filter.start(T_cam_obj, information, stamp_ns)
 
     def view(self, frame: Frame, clock: Stopwatch) -> ObjectView | str:
         """What the frame shows of the object, or the reason why it shows nothing."""

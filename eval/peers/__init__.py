@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
@@ -41,12 +41,31 @@ Opener = Callable[[Sequence[ConceptModel], TrackerConfig, SaliencyBackend], Meth
 class MethodKind:
     """open: makes one. start: what it does with a pose that it is told: "needed", it cannot do without; "used";
     "ignored", it searches every frame anew. concepts: whether it uses the models' concepts, and so the backend.
-    settings: for the protocol of a report, JSON-ready; empty where the run's configuration holds them."""
+    settings: JSON-ready; empty where the run's configuration holds them."""
 
     open: Opener
-    start: str
+    start: Literal["needed", "used", "ignored"]
     concepts: bool
     settings: dict[str, Any]
+
+    def stated(
+        self, config: TrackerConfig, backend: SaliencyBackend, vocabulary: str | None, initialisation: str
+    ) -> dict[str, object]:
+        """What a report's protocol says of the method and its start, JSON-ready."""
+        unused = "not used by the method"
+        told = "gt: each object's true pose is told once a scene, in the first frame where it is visible"
+        if initialisation != "gt":
+            told = "estimated: no true pose is given after onboarding"
+        elif self.start == "ignored":
+            told += "; the method searches every frame anew and ignores it"
+        return {
+            "method_settings": self.settings or "the run's configuration",
+            "backend": f"{backend.name} ({backend.fingerprint})" if self.concepts else unused,
+            "weights": backend.weights if self.concepts else unused,
+            "vocabulary": (vocabulary or "the backend's own") if self.concepts else unused,
+            "prior": "on" if self.start == "needed" or (self.start == "used" and config.prior) else "off",
+            "initialisation": told,
+        }
 
 
 def _ours() -> MethodKind:

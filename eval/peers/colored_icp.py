@@ -3,7 +3,9 @@ at several scales, from the last pose.
 
 Its reach is short and steps between frames are large, so point-to-plane ICP comes first, from the same two starts as
 the peer `icp`. Then colour and geometry together, from coarse to fine clouds, onto the model's points that face the
-camera. Confidence is the fitness: the share of the seen points that lie on the model.
+camera; the lengths are in diameters, as its balance of colour and geometry is made for scenes of metres. Where that
+leaves the surface, the pose before it stands. Confidence is the fitness: the share of the seen points that lie on the
+model.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ registration = o3d.pipelines.registration
 class ColoredIcpConfig(BaseModel):
     """icp: of the approach. voxels: of the clouds from coarse to fine, and reaches: distances at which a pair stops
     counting, as shares of the diameter. steps: iterations at each. geometric: share of the geometry in what is
-    minimised (open3d's lambda). least_fitness: under which there is no pose."""
+    minimised (open3d's lambda). fitness_lost: by how much the fitness may fall. least_fitness: under which there is no
+    pose."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -36,7 +39,8 @@ class ColoredIcpConfig(BaseModel):
     voxels: tuple[float, ...] = (0.06, 0.03, 0.016)
     reaches: tuple[float, ...] = (0.12, 0.06, 0.03)
     steps: int = Field(default=30, ge=1)
-    geometric: float = Field(default=0.968, ge=0, le=1)
+    geometric: float = Field(default=0.95, ge=0, le=1)
+    fitness_lost: float = Field(default=0.05, ge=0, le=1)
     least_fitness: float = Field(default=0.5, ge=0, le=1)
 
 
@@ -57,32 +61,35 @@ class ColoredIcp:
             return "poor fit: too few of the seen points are near the model"
         with clock("colored icp"):
             T_cam_obj = self._aligned(near.T_cam_obj, seen)
-            fitness = 0.0 if T_cam_obj is None else self._surface.fitness(T_cam_obj, seen)
-        if T_cam_obj is None or fitness < self._config.least_fitness:
-            return f"poor fit: {fitness:.2f} of the seen points lie on the model"
-        return Fit(T_cam_obj, fitness)
+            fit = Fit(T_cam_obj, self._surface.fitness(T_cam_obj, seen))
+        if fit.fitness < near.fitness - self._config.fitness_lost:
+            fit = near
+        if fit.fitness < self._config.least_fitness:
+            return f"poor fit: {fit.fitness:.2f} of the seen points lie on the model"
+        return fit
 
-    def _aligned(self, T_cam_obj: Pose, seen: SeenSurface) -> Pose | None:
-        """None where the two have no points within reach of each other."""
-        model, config, cloud = self._model, self._config, seen.cloud()
+    def _aligned(self, T_cam_obj: Pose, seen: SeenSurface) -> Pose:
+        model, config, diameter_m = self._model, self._config, self._model.diameter_m
         facing = ((model.normals @ T_cam_obj.rotation.T) * (T_cam_obj @ model.points)).sum(axis=1) < 0
-        target = open3d_cloud(model.points[facing], model.normals[facing], model.colours[facing])
-        T_obj_cam = T_cam_obj.inverse().matrix
+        source = open3d_cloud(seen.points / diameter_m, seen.normals, seen.colours)
+        target = open3d_cloud(model.points[facing] / diameter_m, model.normals[facing], model.colours[facing])
+        moving = T_cam_obj.inverse().matrix
+        moving[:3, 3] /= diameter_m
         for voxel, reach in zip(config.voxels, config.reaches, strict=True):
-            coarse = [c.voxel_down_sample(voxel * model.diameter_m) for c in (cloud, target)]
-            try:
-                found = registration.registration_colored_icp(
-                    *coarse, reach * model.diameter_m, T_obj_cam,
-                    registration.TransformationEstimationForColoredICP(config.geometric),
-                    registration.ICPConvergenceCriteria(1e-6, 1e-6, config.steps),
-                )  # fmt: skip
-            except RuntimeError:  # open3d's word for "no correspondences"
-                return None
-            T_obj_cam = found.transformation
-        return Pose.from_matrix(T_obj_cam).inverse()
+            coarse_source, coarse_target = (cloud.voxel_down_sample(voxel) for cloud in (source, target))
+            found = registration.registration_colored_icp(
+                coarse_source, coarse_target, reach, moving,
+                registration.TransformationEstimationForColoredICP(config.geometric),
+                registration.ICPConvergenceCriteria(1e-6, 1e-6, config.steps),
+            )  # fmt: skip
+            moving = found.transformation.copy()
+        moving[:3, 3] *= diameter_m
+        return Pose.from_matrix(moving).inverse()
 
 
 def open_colored_icp(
-    models: Sequence[ConceptModel], config: TrackerConfig, backend: SaliencyBackend  # noqa: ARG001
+    models: Sequence[ConceptModel],
+    config: TrackerConfig,
+    backend: SaliencyBackend,  # noqa: ARG001
 ) -> PeerTracker:
     return PeerTracker(models, config, lambda model: ColoredIcp(model, ColoredIcpConfig()))

@@ -1,16 +1,15 @@
 """Peer `fpfh`: open3d's FPFH features, RANSAC over their matches, point-to-plane ICP. Every frame anew.
 
-Frame and model at the resolution of the tracker's view; mutual nearest features; open3d's RANSAC (three points, point to
-point, edge lengths, distances and normals checked); then the ICP. The geometry of most objects nearly repeats, so RANSAC
-runs several times with other seeds and the best fit counts. Confidence is its fitness: the share of the seen points
-that lie on the model.
+Frame and model are thinned to a fortieth of the diameter; mutual nearest features (all nearest ones where few are
+mutual); open3d's RANSAC (three points, point to point, edge lengths, distances and normals checked); then the ICP. The
+geometry of most objects nearly repeats, so RANSAC runs several times with other seeds and the best fit counts.
+Confidence is its fitness: the share of the seen points that lie on the model.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import open3d as o3d
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -64,6 +63,13 @@ class FpfhPose:
         self._surface = ModelSurface(model, polish)
 
     def __call__(self, seen: SeenSurface, T_last: Pose | None, clock: Stopwatch) -> Fit | str:  # noqa: ARG002
+        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):  # it prints how many are mutual
+            best = self._best(seen, clock)
+        if best is None or best.fitness < self._config.least_fitness:
+            return f"poor fit: {best.fitness if best else 0:.2f} of the seen points lie on the model"
+        return best
+
+    def _best(self, seen: SeenSurface, clock: Stopwatch) -> Fit | None:
         with clock("features"):
             cloud, features = self._described(seen.cloud())
         best = None
@@ -76,22 +82,16 @@ class FpfhPose:
                 best = fit
             if best is not None and best.fitness > self._config.good_fitness:
                 break
-        if best is None or best.fitness < self._config.least_fitness:
-            return f"poor fit: {best.fitness if best else 0:.2f} of the seen points lie on the model"
         return best
 
-    def _described(
-        self, cloud: o3d.geometry.PointCloud
-    ) -> tuple[o3d.geometry.PointCloud, registration.Feature]:
+    def _described(self, cloud: o3d.geometry.PointCloud) -> tuple[o3d.geometry.PointCloud, registration.Feature]:
         config = self._config
         thinned = cloud.voxel_down_sample(config.voxel * self._diameter_m)
         thinned.normalize_normals()
         near = o3d.geometry.KDTreeSearchParamHybrid(config.feature_radius * self._diameter_m, config.neighbours)
         return thinned, registration.compute_fpfh_feature(thinned, near)
 
-    def _registered(
-        self, cloud: o3d.geometry.PointCloud, features: registration.Feature, seed: int
-    ) -> Pose | None:
+    def _registered(self, cloud: o3d.geometry.PointCloud, features: registration.Feature, seed: int) -> Pose | None:
         """T_cam_obj, None where no three matches fit together."""
         config, threshold_m = self._config, self._config.threshold * self._diameter_m
         o3d.utility.random.seed(seed)

@@ -2,7 +2,8 @@
 
 opencv's SIFT in the mask's box, enlarged, as objects are small; matches by the ratio test within each reference view;
 open3d's RANSAC over their 3D points (three points, point to point, edge lengths checked) with a least-squares fit to
-its inliers; then point-to-plane ICP. Confidence is the inlier share: of the matches, those whose points meet.
+its inliers; then point-to-plane ICP, which counts where no fewer matches agree with it than before. Confidence is the
+inlier share: of the matches, those whose points meet.
 """
 
 from __future__ import annotations
