@@ -89,7 +89,7 @@ class FpfhPose:
         thinned = cloud.voxel_down_sample(config.voxel * self._diameter_m)
         thinned.normalize_normals()
         near = o3d.geometry.KDTreeSearchParamHybrid(config.feature_radius * self._diameter_m, config.neighbours)
-        return thinned, registration.compute_fpfh_feature(thinned, near)
+        return thinned, registration.compute_fpfh_feature(thinned, near)  # pyright: ignore[reportCallIssue]
 
     def _registered(self, cloud: o3d.geometry.PointCloud, features: registration.Feature, seed: int) -> Pose | None:
         """T_cam_obj, None where no three matches fit together."""

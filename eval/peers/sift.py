@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -68,7 +69,8 @@ class Features:
 
 class SiftFeatures:
     def __init__(self, config: SiftConfig) -> None:
-        self._config, self._sift = config, cv2.SIFT_create(contrastThreshold=config.contrast)
+        opencv: Any = cv2  # its stubs lack SIFT
+        self._config, self._sift = config, opencv.SIFT_create(contrastThreshold=config.contrast)
 
     def __call__(self, frame: Frame, mask: Mask) -> Features:
         """Of the masked pixels that have depth."""
@@ -132,25 +134,27 @@ class SiftPose:
     def _matched(self, features: Features) -> tuple[Floats, Floats]:
         """Points (M, 3) of the frame and of the model, a pair a match."""
         matcher = cv2.BFMatcher(cv2.NORM_L2)
-        points, model_points = [np.zeros((0, 3))], [np.zeros((0, 3))]
+        points: list[Floats] = [np.zeros((0, 3))]
+        model_points: list[Floats] = [np.zeros((0, 3))]
         for view in self._views:
             if len(features.points) == 0 or len(view.points) < 2:
                 continue
             pairs = matcher.knnMatch(features.descriptors, view.descriptors, k=2)
             good = [first for first, second in pairs if first.distance < self._config.ratio * second.distance]
-            points.append(features.points[[match.queryIdx for match in good]])
-            model_points.append(view.points[[match.trainIdx for match in good]])
+            query, train = np.array([(m.queryIdx, m.trainIdx) for m in good], np.intp).reshape(-1, 2).T
+            points.append(features.points[query])
+            model_points.append(view.points[train])
         return np.concatenate(points), np.concatenate(model_points)
 
     def _registered(self, points: Floats, model_points: Floats) -> Fit | None:
         """The pose on which most matches agree, None where too few do. Fitness: the share that does."""
         config = self._config
         o3d.utility.random.seed(config.seed)
-        clouds = [o3d.geometry.PointCloud(o3d.utility.Vector3dVector(p)) for p in (model_points, points)]
+        model, seen = (o3d.geometry.PointCloud(o3d.utility.Vector3dVector(p)) for p in (model_points, points))
         same = np.stack((np.arange(len(points)),) * 2, axis=1).astype(np.int32)
         estimation = registration.TransformationEstimationPointToPoint(False)
         result = registration.registration_ransac_based_on_correspondence(
-            *clouds, o3d.utility.Vector2iVector(same), self._threshold_m, estimation, 3,
+            model, seen, o3d.utility.Vector2iVector(same), self._threshold_m, estimation, 3,
             [registration.CorrespondenceCheckerBasedOnEdgeLength(config.edge_similarity)],
             registration.RANSACConvergenceCriteria(config.iterations, config.confidence),
         )  # fmt: skip
@@ -160,7 +164,7 @@ class SiftPose:
             if inliers.sum() < config.least_inliers:
                 return None
             pairs = o3d.utility.Vector2iVector(same[inliers])
-            T_cam_obj = Pose.from_matrix(estimation.compute_transformation(*clouds, pairs))
+            T_cam_obj = Pose.from_matrix(estimation.compute_transformation(model, seen, pairs))
             inliers = self._meeting(T_cam_obj, points, model_points)
         return Fit(T_cam_obj, float(inliers.mean()))
 
