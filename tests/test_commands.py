@@ -426,6 +426,17 @@ def test_eval_track_can_score_raw_poses_without_a_prior(run: Run, tmp_path: Path
     assert not read_config(tmp_path / "out" / "config.yaml").prior
 
 
+def test_eval_track_says_which_method_it_scored_and_what_that_was_told(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    said = run("eval", "track", "--dataset", SOURCE, "--method", "icp", "--init", "gt", "--out", out)
+    assert said.code == 0, said.err
+    assert "method icp" in " ".join(said.err.split())
+    protocol = json.loads((out / "scores.json").read_text())["protocol"]
+    assert (protocol["method"], protocol["backend"]) == ("icp", "not used by the method")
+    assert protocol["initialisation"].startswith("gt: each object's true pose is told once a scene")
+    assert protocol["method_settings"]["reach_start"] == 0.8
+
+
 def test_eval_track_refuses_a_folder_with_results(run: Run, filled: Path) -> None:
     assert_refused(run("eval", "track", "--dataset", SOURCE, "--out", filled), "holds results already")
     assert content(filled) == {"precious.txt": b"of last week"}
@@ -440,6 +451,7 @@ def test_eval_track_refuses_a_folder_with_results(run: Run, filled: Path) -> Non
         (("--dataset", SOURCE, "--objects", "spoon"), ("no object 'spoon'", BOX)),
         (("--dataset", SOURCE, "--backend", "tea"), ("'tea'", "attributes")),
         (("--dataset", SOURCE, "--views", "0"), ("--views", "0")),
+        (("--dataset", SOURCE, "--method", "icp"), ("method icp", "--init gt")),
         (("--dataset", SOURCE, "--config", "absent.yaml"), ("absent.yaml",)),
     ],
 )

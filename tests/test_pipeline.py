@@ -199,6 +199,56 @@ def test_an_object_that_jumps_is_found_where_it_is_at_once(
     assert_near(results, [*can_frames[:2], jumped], can_scene)
 
 
+def test_a_can_is_looked_for_where_it_is_said_to_be_first(
+    can_scene: SyntheticScene, can_model: ConceptModel, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    tracker = ObjectTracker(can_model)
+    roughly = can_truth.nudged(np.array([0.05, 0.05, 0, 0.004, 0, 0.004]))
+    tracker.place(CAN, roughly, can_frames[0].stamp_ns)
+    results = [tracker.step(frame)[0] for frame in can_frames[:3]]
+    assert_near(results, can_frames[:3], can_scene)
+    assert {r.reason for r in results} <= {"found by prediction", "found by concepts"}
+
+
+def test_a_can_that_is_not_where_it_is_said_to_be_is_found_nevertheless(
+    can_scene: SyntheticScene, can_model: ConceptModel, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    tracker = ObjectTracker(can_model)
+    tracker.place(CAN, can_truth.nudged(np.array([1.5, 0, 0, 0.2, 0, 0.3])), can_frames[0].stamp_ns)
+    results = [tracker.step(frame)[0] for frame in can_frames[:2]]
+    assert results[0].reason == "found by search"
+    assert_near(results, can_frames[:2], can_scene)
+
+
+def test_to_say_where_an_object_is_says_nothing_of_whether_it_is_seen(
+    can_model: ConceptModel, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    tracker = ObjectTracker(can_model)
+    tracker.place(CAN, can_truth, can_frames[0].stamp_ns)
+    (hidden,) = tracker.step(empty_mask(can_frames[0]))
+    assert (hidden.pose, hidden.state) == (None, TrackState.INITIALISING)
+
+
+def test_an_object_is_placed_by_a_name_and_at_a_time_that_there_is(
+    can_model: ConceptModel, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    tracker = ObjectTracker(can_model)
+    tracker.step(empty_mask(can_frames[1]))
+    with pytest.raises(ConfigError, match="no model of object 'mug' to place; there are soup_can"):
+        tracker.place("mug", can_truth, can_frames[1].stamp_ns)
+    for stamp_ns in (can_frames[0].stamp_ns, -1, 0.5):
+        with pytest.raises(
+            FrameError, match=f"'soup_can' is of {stamp_ns} ns: .*last frame's {can_frames[1].stamp_ns}"
+        ):
+            tracker.place(CAN, can_truth, stamp_ns)  # pyright: ignore[reportArgumentType]
+    tracker.place(CAN, can_truth, can_frames[3].stamp_ns)
+    with pytest.raises(FrameError, match=f"not after the pose that was told, {can_frames[3].stamp_ns} ns"):
+        tracker.step(can_frames[2])
+    assert tracker.step(can_frames[3])[0].pose is not None
+    with pytest.raises(ConfigError, match="with prior off"):
+        ObjectTracker(can_model, WITHOUT_PRIOR).place(CAN, can_truth, 0)
+
+
 @pytest.mark.parametrize("back_ns", [0, 1, 20_000_000])
 def test_a_stamp_that_does_not_advance_is_refused_and_nothing_is_lost(
     back_ns: int, can_model: ConceptModel, can_frames: list[Frame]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -14,11 +15,11 @@ from eval.predict import Protocol, Tracked, track_dataset
 from eval.score import TrackingCounts
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
-from tracker.errors import FrameError, SourceError
+from tracker.errors import ConfigError, FrameError, SourceError
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.pipeline import ObjectTracker
-from tracker.result import TrackResult
+from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources import Sighting
 from tracker.sources.synthetic import ObjectShape, SyntheticScene, open_scene
@@ -170,6 +171,68 @@ def test_all_objects_of_an_image_share_its_time(protocol: Protocol) -> None:
         times_s = {e.time_s for e in tracked.estimates if e.image_id == image_id}
         spent_ms = [r.timings_ms["total"] for r in shown.results[2 * image_id : 2 * image_id + 2]]
         assert times_s == {sum(spent_ms) / 1000}
+
+
+@dataclass
+class Told:
+    """A method that only remembers what it is told, and before which frame."""
+
+    models: Sequence[ConceptModel]
+    told: list[tuple[str, int, Pose]] = field(default_factory=list)
+    steps: int = 0
+
+    def place(self, object_id: str, T_cam_obj: Pose, stamp_ns: int) -> None:
+        self.told.append((object_id, stamp_ns, T_cam_obj))
+
+    def step(self, frame: Frame) -> tuple[TrackResult, ...]:
+        assert all(stamp_ns <= frame.stamp_ns for _, stamp_ns, _ in self.told)
+        self.steps += 1
+        state, spent = TrackState.INITIALISING, {"total": 1.0}
+        return tuple(
+            TrackResult(frame.stamp_ns, m.object_id, None, state, 0.0, None, "not mine", None, None, spent)
+            for m in self.models
+        )
+
+
+@pytest.mark.parametrize(("initialisation", "times"), [("estimated", 0), ("gt", 1)])
+def test_a_true_pose_is_told_once_in_the_first_frame_that_shows_the_object_or_never(
+    initialisation: Literal["estimated", "gt"], times: int, protocol: Protocol, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    methods: list[Told] = []
+
+    def opened(name: str, models: Sequence[ConceptModel], *_: object) -> Told:
+        assert name == "ours"
+        methods.append(Told(models))
+        return methods[-1]
+
+    def unseen(sighting: Sighting) -> Sighting:
+        return replace(sighting, visible_px=0, visible_fraction=0.0) if sighting.index < 2 else sighting
+
+    monkeypatch.setattr("eval.predict.open_method", opened)
+    track_dataset(SyntheticDataset(Edited(sighting=unseen)), replace(protocol, initialisation=initialisation))
+    (method,) = methods
+    assert method.steps == 6
+    assert len(method.told) == times
+    for object_id, stamp_ns, T_cam_obj in method.told:
+        assert (object_id, stamp_ns) == (BOX, small_scene()[2].stamp_ns)
+        assert np.array_equal(T_cam_obj.matrix, small_scene().sightings(BOX)[2].T_cam_obj.matrix)
+
+
+def test_a_method_that_goes_on_from_a_pose_is_refused_without_one(protocol: Protocol) -> None:
+    for method in ("icp", "colored-icp"):
+        with pytest.raises(ConfigError, match=f"method {method} .* needs --init gt"):
+            replace(protocol, method=method)
+    with pytest.raises(ConfigError, match="--init gt needs --prior on"):
+        replace(protocol, config=TrackerConfig(prior=False), initialisation="gt")
+    with pytest.raises(ConfigError, match="no method 'best'"):
+        replace(protocol, method="best")
+
+
+def test_a_peer_is_tracked_as_the_tracker_is(protocol: Protocol) -> None:
+    tracked = track_dataset(open_synthetic(SMALL), replace(protocol, method="icp", initialisation="gt"))
+    assert [e.image_id for e in tracked.estimates] == list(range(6))
+    for estimate in tracked.estimates:
+        assert estimate.T_cam_obj.distance_to_m(small_scene().sightings(BOX)[estimate.image_id].T_cam_obj) < 0.003
 
 
 def test_the_viewer_gets_every_frame_with_its_truth_and_is_closed(protocol: Protocol) -> None:
