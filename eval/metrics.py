@@ -2,15 +2,16 @@
 
 Definitions: BOP's (Hodan et al. 2016, "On Evaluation of 6D Object Pose Estimation"; `pose_error.py` of bop_toolkit).
 Every function takes equally long sequences of estimated and of true `T_cam_obj` and gives one error an instance.
-Nothing here knows of symmetries: the errors that minimise over them (MSSD, MSPD) take the symmetry transforms as an
-argument when they come, and which object counts as symmetric is the dataset's word (`ObjectModel.symmetric`).
+Nothing here knows of symmetries: `eval.symmetric_errors` holds the errors that minimise over them.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 
 import numpy as np
+import small_gicp
 from scipy.spatial import KDTree
 
 from tracker.geometry import Floats, Pose
@@ -21,8 +22,8 @@ def add(points_m: Floats, estimated: Sequence[Pose], truth: Sequence[Pose]) -> F
 
     points_m: (N, 3) model points in object coordinates. Returns (K,) for K pairs of poses.
     """
-    turns, shifts_m = _stack(estimated)
-    true_turns, true_shifts_m = _stack(truth)
+    turns, shifts_m = stack(estimated)
+    true_turns, true_shifts_m = stack(truth)
     turns, shifts_m = turns - true_turns, shifts_m - true_shifts_m
     return np.array([_mean_length(points_m @ turns[k].T + shifts_m[k]) for k in range(len(turns))])
 
@@ -37,15 +38,16 @@ def adds(points_m: Floats, estimated: Sequence[Pose], truth: Sequence[Pose], que
     points_m: (N, 3) model points in object coordinates. queries_m: (M, 3) points x over which the mean is taken, where
     a part of the model shall stand for all of it. Returns (K,) for K pairs of poses.
     """
-    turns, shifts_m = _stack(estimated)
-    true_turns, true_shifts_m = _stack(truth)
+    turns, shifts_m = stack(estimated)
+    true_turns, true_shifts_m = stack(truth)
     # Solved, not transposed: a rotation read from a rounded file is a rotation to three digits only.
     turns, shifts_m = np.linalg.solve(turns, true_turns), np.linalg.solve(turns, (true_shifts_m - shifts_m)[..., None])
-    # Sliding midpoint without compact nodes: as fast near the surface, half the time far from it (scans, 8k vertices).
-    tree = KDTree(points_m, balanced_tree=False, compact_nodes=False)
-    queries_m = points_m if queries_m is None else queries_m
+    order = KDTree(points_m).indices  # neighbours beside each other in memory: a third of the time is saved
+    # a third of the time of scipy's tree on scans of 8,000 vertices
+    tree = small_gicp.KdTree(np.ascontiguousarray(points_m[order], np.float64))
+    queries_m = points_m[order] if queries_m is None else queries_m
     moved = (queries_m @ turns[k].T + shifts_m[k, :, 0] for k in range(len(turns)))
-    return np.array([np.mean(tree.query(points, workers=-1)[0]) for points in moved])
+    return np.array([_mean_distance(tree, points) for points in moved])
 
 
 def rotation_error_deg(estimated: Sequence[Pose], truth: Sequence[Pose]) -> Floats:
@@ -53,7 +55,7 @@ def rotation_error_deg(estimated: Sequence[Pose], truth: Sequence[Pose]) -> Floa
 
     From sine and cosine together: the arc cosine of the trace alone loses half the digits near 0 and near 180.
     """
-    relative = _stack(estimated)[0] @ _stack(truth)[0].transpose(0, 2, 1)
+    relative = stack(estimated)[0] @ stack(truth)[0].transpose(0, 2, 1)
     skew = relative - relative.transpose(0, 2, 1)
     sine = np.linalg.norm(skew[:, [2, 0, 1], [1, 2, 0]], axis=1) / 2
     cosine = (np.trace(relative, axis1=1, axis2=2) - 1) / 2
@@ -62,10 +64,10 @@ def rotation_error_deg(estimated: Sequence[Pose], truth: Sequence[Pose]) -> Floa
 
 def translation_error_m(estimated: Sequence[Pose], truth: Sequence[Pose]) -> Floats:
     """Distance of the object origins in metres, (K,)."""
-    return np.linalg.norm(_stack(estimated)[1] - _stack(truth)[1], axis=1)
+    return np.linalg.norm(stack(estimated)[1] - stack(truth)[1], axis=1)
 
 
-def _stack(poses: Sequence[Pose]) -> tuple[Floats, Floats]:
+def stack(poses: Sequence[Pose]) -> tuple[Floats, Floats]:
     """Rotations (K, 3, 3) and translations (K, 3) in metres; K may be 0."""
     rotations = np.array([pose.rotation for pose in poses], np.float64).reshape(-1, 3, 3)
     return rotations, np.array([pose.translation_m for pose in poses], np.float64).reshape(-1, 3)
@@ -73,3 +75,8 @@ def _stack(poses: Sequence[Pose]) -> tuple[Floats, Floats]:
 
 def _mean_length(vectors: Floats) -> float:
     return float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)).mean())
+
+
+def _mean_distance(tree: small_gicp.KdTree, points_m: Floats) -> float:
+    squares = tree.batch_nearest_neighbor_search(points_m, num_threads=os.cpu_count() or 1)[1]
+    return float(np.sqrt(squares).mean())
