@@ -12,14 +12,14 @@ from __future__ import annotations
 import csv
 import logging
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 
-from tracker.errors import OutputError
+from tracker.errors import OutputError, SourceError
 from tracker.geometry import Floats, Pose
 
 log = logging.getLogger(__name__)
@@ -41,12 +41,16 @@ class Estimate:
     time_s: float = NO_TIME_S
 
 
-def read_results(path: str | Path) -> list[Estimate]:
-    """The estimates in the order of the file. Raises OutputError that names the file and the line."""
+def read_results(path: str | Path, check: Callable[[Estimate], None] = lambda estimate: None) -> list[Estimate]:  # noqa: ARG005
+    """The estimates in the order of the file. Several of one object in an image are several instances, or hypotheses.
+
+    check: raises SourceError where an estimate is of something that there is not. Raises OutputError that names the
+    file and the line, also where a row is there twice, and where an image has two times.
+    """
     path = Path(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            estimates = list(_rows(path, file))
+            estimates = list(_rows(path, file, check))
     except OSError as error:
         raise OutputError(f"{path}: cannot be read ({error.strerror})") from error
     if estimates and np.median([np.linalg.norm(e.T_cam_obj.translation_m) for e in estimates]) < 0.01:
@@ -74,8 +78,9 @@ def write_results(path: str | Path, estimates: Iterable[Estimate]) -> None:
         unfinished.unlink(missing_ok=True)
 
 
-def _rows(path: Path, lines: Iterable[str]) -> Iterator[Estimate]:
+def _rows(path: Path, lines: Iterable[str], check: Callable[[Estimate], None]) -> Iterator[Estimate]:
     reader = csv.reader(lines, strict=True)
+    seen = _RowsBefore()
     try:
         header = [name.strip() for name in next(reader, [])]
         missing = [name for name in COLUMNS if name not in header]
@@ -86,9 +91,32 @@ def _rows(path: Path, lines: Iterable[str]) -> Iterator[Estimate]:
                 continue
             if len(cells) != len(header):
                 raise ValueError(f"{len(cells)} values, the header has {len(header)}")
-            yield _estimate(dict(zip(header, cells, strict=True)))
-    except (ValueError, csv.Error) as error:  # text that is not UTF-8 is a ValueError too
+            estimate = _estimate(dict(zip(header, cells, strict=True)))
+            seen.require_new(estimate, reader.line_num)
+            check(estimate)
+            yield estimate
+    except (ValueError, csv.Error, SourceError) as error:  # text that is not UTF-8 is a ValueError too
         raise OutputError(f"{path}, line {max(reader.line_num, 1)}: {error}") from error
+
+
+class _RowsBefore:
+    """What the rows of a file agree in: every one is there once, and an image has one time."""
+
+    def __init__(self) -> None:
+        self._lines: dict[tuple[object, ...], int] = {}
+        self._times_s: dict[tuple[int, int], tuple[float, int]] = {}
+
+    def require_new(self, e: Estimate, line: int) -> None:
+        """Raises ValueError with the line of the row that this one repeats or contradicts."""
+        time_s, before = self._times_s.setdefault((e.scene_id, e.image_id), (e.time_s, line))
+        if time_s != e.time_s:
+            raise ValueError(
+                f"time is {e.time_s:g} s, in line {before} {time_s:g} s; all rows of an image have the image's time"
+            )
+        numbers = np.concatenate((e.T_cam_obj.rotation.ravel(), e.T_cam_obj.translation_m, (e.score,)))
+        before = self._lines.setdefault((e.scene_id, e.image_id, e.object_id, numbers.tobytes()), line)
+        if before != line:
+            raise ValueError(f"the same estimate as in line {before}")
 
 
 def _estimate(row: dict[str, str]) -> Estimate:

@@ -1,17 +1,19 @@
-"""Estimates meet targets: which estimate answers which target, and the errors that it has."""
+"""Estimates meet targets: a row of errors for every target."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from eval.answers import best_estimates, targets_of
 from eval.bop_results import Estimate
-from eval.datasets import Dataset, ObjectModel, Target, require
-from eval.metrics import add, adds, rotation_error_deg, translation_error_m
-from tracker.geometry import Pose
+from eval.datasets import Dataset, ObjectModel, Target
+from eval.object_errors import PoseErrors, missing_pose, pose_errors
+from eval.pictures import Cameras, PosePair, surface_errors, why_no_cameras
+from eval.visible_surface import TAUS
 
 log = logging.getLogger(__name__)
 
@@ -20,7 +22,11 @@ ObjectInImage = tuple[int, str, int]  # scene, object, image
 
 @dataclass(frozen=True, slots=True)
 class InstanceError:
-    """The errors of one target; all are infinite where its pose is missing. diameter_m is the object's."""
+    """The errors of one target (`PoseErrors` says which); all are infinite where its pose is missing, and iou is 0.
+
+    diameter_m: the object's. symmetric: whether ADD(-S) takes its ADD-S; None where nobody says. vsd: at the ten
+    misalignments, None where it was not asked for or the object has no mesh.
+    """
 
     scene_id: int
     image_id: int
@@ -31,15 +37,22 @@ class InstanceError:
     rotation_deg: float
     translation_m: float
     missing: bool
+    symmetric_rotation_deg: float
+    mssd_m: float
+    mspd_px: float
+    iou: float
+    symmetric: bool | None
+    vsd: tuple[float, ...] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Instances:
     """errors: a row a target, by the object's number, then by scene and image.
 
-    symmetric: those of the objects that the dataset declares symmetric; None where it declares nothing.
+    symmetric: those of the objects that count as symmetric for ADD(-S); None where nobody declares anything.
     excluded: targets left out on demand. ignored: estimates where there is no target. surplus: estimates beside one
-    of a better score of the same object in the same image.
+    of a better score of the same object in the same image. no_cameras: why MSPD could not be measured, None where it
+    was. without_mesh: objects of which no picture can be rendered, so that they have no VSD.
     """
 
     errors: tuple[InstanceError, ...]
@@ -47,6 +60,8 @@ class Instances:
     excluded: int
     ignored: int
     surplus: int
+    no_cameras: str | None
+    without_mesh: tuple[str, ...]
 
 
 def measure(
@@ -55,14 +70,18 @@ def measure(
     scene_ids: Sequence[int] | None = None,
     object_ids: Sequence[str] | None = None,
     exclude: Collection[ObjectInImage] = frozenset(),
+    symmetric: Collection[str] | None = None,
+    with_vsd: bool = False,
 ) -> Instances:
     """The errors of every target of the scenes and objects (all unless given) but those in `exclude`.
 
-    Raises SourceError where the dataset does not have such a scene or object, or lacks a model.
+    symmetric: the objects whose ADD(-S) is ADD-S, instead of those that the dataset declares. with_vsd: read the depth
+    of every image for VSD. Raises SourceError where the dataset does not have such a scene or object, or lacks a model,
+    or a picture for VSD.
     """
-    found = _targets(dataset, scene_ids, object_ids)
+    found = targets_of(dataset, scene_ids, object_ids)
     numbers = {object_id: dataset.number(object_id) for object_id in {t.object_id for _, t in found}}
-    best, surplus = _best(estimates)
+    best, surplus = best_estimates(estimates)
     ignored = len(best.keys() - {(scene_id, t.image_id, numbers[t.object_id]) for scene_id, t in found})
     if ignored:
         log.info("%d estimates are of no target and are ignored", ignored)
@@ -73,63 +92,84 @@ def measure(
         if (scene_id, t.object_id, t.image_id) not in left_out:
             kept.setdefault(t.object_id, []).append((scene_id, t))
     models = {object_id: dataset.model(object_id) for object_id in kept}
-    errors: list[InstanceError] = []
-    for object_id, targets in kept.items():
-        log.info("measuring %d poses of object %s", len(targets), object_id)
-        answers = [best.get((scene_id, t.image_id, numbers[object_id])) for scene_id, t in targets]
-        errors += _errors(models[object_id], targets, [answer and answer.T_cam_obj for answer in answers])
-    return Instances(tuple(errors), _symmetric(models), len(found) - len(errors), ignored, surplus)
-
-
-def _targets(
-    dataset: Dataset, scene_ids: Sequence[int] | None, object_ids: Sequence[str] | None
-) -> list[tuple[int, Target]]:
-    """(scene, target) of the scenes and objects, all unless given."""
-    for object_id in object_ids or ():
-        require("object", object_id, dataset.object_ids, dataset.name)
-    return [
-        (scene_id, target)
-        for scene_id in (dataset.scene_ids if scene_ids is None else sorted(set(scene_ids)))
-        for target in dataset.targets(scene_id)
-        if object_ids is None or target.object_id in object_ids
+    declared = _symmetric(models, symmetric)
+    questions = [(scene_id, t) for targets in kept.values() for scene_id, t in targets]
+    answers = [best.get((scene_id, t.image_id, numbers[t.object_id])) for scene_id, t in questions]
+    cameras = Cameras(dataset)
+    no_cameras = why_no_cameras(cameras, [(scene_id, t.index) for scene_id, t in questions])
+    errors = _errors(models, questions, answers, cameras if no_cameras is None else None)
+    surfaces = _surfaces(dataset, models, questions, answers) if with_vsd else {}
+    rows = [
+        InstanceError(
+            scene_id,
+            t.image_id,
+            t.object_id,
+            models[t.object_id].diameter_m,
+            **asdict(errors[k]),
+            missing=answers[k] is None,
+            symmetric=None if declared is None else t.object_id in declared,
+            vsd=surfaces.get(k),
+        )
+        for k, (scene_id, t) in enumerate(questions)
     ]
+    return Instances(
+        errors=tuple(rows),
+        symmetric=declared,
+        excluded=len(found) - len(rows),
+        ignored=ignored,
+        surplus=surplus,
+        no_cameras=no_cameras,
+        without_mesh=tuple(object_id for object_id, model in models.items() if model.triangles is None),
+    )
 
 
-def _symmetric(models: Mapping[str, ObjectModel]) -> tuple[str, ...] | None:
+def _symmetric(models: Mapping[str, ObjectModel], told: Collection[str] | None) -> tuple[str, ...] | None:
+    """Of the objects, those that somebody declares symmetric; None where nobody says."""
+    if told is not None:
+        if unknown := sorted(set(told) - models.keys()):
+            log.warning("told to be symmetric, but not among the objects that are scored: %s", ", ".join(unknown))
+        return tuple(object_id for object_id in models if object_id in told)
     if any(model.symmetric is None for model in models.values()):
         return None
     return tuple(object_id for object_id, model in models.items() if model.symmetric)
 
 
-def _best(estimates: Iterable[Estimate]) -> tuple[dict[tuple[int, int, int], Estimate], int]:
-    """The best-scored estimate of every (scene, image, object), the first of equals; and how many are beside it."""
-    best: dict[tuple[int, int, int], Estimate] = {}
-    surplus = 0
-    for estimate in estimates:
-        key = (estimate.scene_id, estimate.image_id, estimate.object_id)
-        surplus += key in best
-        if key not in best or estimate.score > best[key].score:
-            best[key] = estimate
-    if surplus:
-        log.warning("%d estimates have a better one of the same object in the same image; only that is scored", surplus)
-    return best, surplus
-
-
 def _errors(
-    model: ObjectModel, targets: Sequence[tuple[int, Target]], answers: Sequence[Pose | None]
-) -> list[InstanceError]:
-    """One row a target, in their order; `answers` holds None where the pose is missing."""
-    columns = np.full((4, len(targets)), np.inf)
-    given = [k for k, answer in enumerate(answers) if answer is not None]
-    estimated = [answer for answer in answers if answer is not None]
-    truth = [targets[k][1].T_cam_obj for k in given]
-    columns[0, given] = add(model.points_m, estimated, truth)
-    columns[1, given] = adds(model.points_m, estimated, truth)
-    columns[2, given] = rotation_error_deg(estimated, truth)
-    columns[3, given] = translation_error_m(estimated, truth)
-    return [
-        InstanceError(
-            scene_id, t.image_id, t.object_id, model.diameter_m, *map(float, column), missing=answers[k] is None
-        )
-        for k, ((scene_id, t), column) in enumerate(zip(targets, columns.T, strict=True))
+    models: Mapping[str, ObjectModel],
+    questions: Sequence[tuple[int, Target]],
+    answers: Sequence[Estimate | None],
+    cameras: Cameras | None,
+) -> list[PoseErrors]:
+    """One a question, in their order. cameras: None where they are not known."""
+    errors = [missing_pose(cameras is not None)] * len(questions)
+    for object_id, model in models.items():
+        asked = [k for k, (_, t) in enumerate(questions) if t.object_id == object_id]
+        log.info("measuring %d poses of object %s", len(asked), object_id)
+        pairs = [(k, answer.T_cam_obj) for k in asked if (answer := answers[k]) is not None]
+        places = [(questions[k][0], questions[k][1].index) for k, _ in pairs]
+        of_images = cameras and [cameras(*place) for place in places]
+        found = pose_errors(model, [e for _, e in pairs], [questions[k][1].T_cam_obj for k, _ in pairs], of_images)
+        for (k, _), each in zip(pairs, found, strict=True):
+            errors[k] = each
+    return errors
+
+
+def _surfaces(
+    dataset: Dataset,
+    models: Mapping[str, ObjectModel],
+    questions: Sequence[tuple[int, Target]],
+    answers: Sequence[Estimate | None],
+) -> dict[int, tuple[float, ...]]:
+    """VSD by the position of the question; infinite where the pose is missing, nothing where the object has no mesh."""
+    pairs = [
+        PosePair(scene_id, t.index, t.object_id, answer.T_cam_obj, t.T_cam_obj, k)
+        for k, ((scene_id, t), answer) in enumerate(zip(questions, answers, strict=True))
+        if answer is not None
     ]
+    log.info("reading the depth of the images of %d poses for VSD", len(pairs))
+    missing = {
+        k: (np.inf,) * len(TAUS)
+        for k, (_, t) in enumerate(questions)
+        if answers[k] is None and models[t.object_id].triangles is not None
+    }
+    return missing | surface_errors(dataset, pairs, models)

@@ -4,49 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from eval.auc import AUC_THRESHOLD_M, auc_exact, auc_vocap, recall_below, share_over
+from eval.auc import AUC_THRESHOLD_M
 from eval.bop_results import Estimate, read_results
+from eval.box_overlap import NOCS_STEPS
 from eval.datasets import Dataset
 from eval.instances import InstanceError, Instances, ObjectInImage, measure
+from eval.known_ids import known_to
+from eval.summary import (
+    DIAMETER_SHARE,
+    FINE_THRESHOLD_M,
+    Metrics,
+    TrackingCounts,
+    mean_of_objects,
+    metrics_of,
+    tracking_metrics,
+)
+from eval.symmetries import STEPS
+from eval.visible_surface import DELTA_M
 
-FINE_THRESHOLD_M = 0.02  # up to 10 cm good trackers are all at 98 and more
-DIAMETER_SHARE = 0.1  # Hinterstoisser et al. 2012: an error under a tenth of the diameter is correct
-CURVES = {
-    "auc": partial(auc_vocap, threshold_m=AUC_THRESHOLD_M),
-    "auc_exact": partial(auc_exact, threshold_m=AUC_THRESHOLD_M),
-    "auc_2cm": partial(auc_vocap, threshold_m=FINE_THRESHOLD_M),
-    "auc_2cm_exact": partial(auc_exact, threshold_m=FINE_THRESHOLD_M),
-}
-OVER_M = {"over_1cm": 0.01, "over_5cm": 0.05}
-COUNTS = ("instances", "missing", "false_tracks")  # summed where everything else is averaged
 # What a score depends on and scoring cannot see: the run says it, or the report shows that nobody did.
 STATED_BY_THE_RUN = ("backend", "masks", "initialisation", "reinitialisation", "poses")
-
-Metrics = dict[str, float]
-
-
-@dataclass(frozen=True, slots=True)
-class TrackingCounts:
-    """What a tracking run saw of an object and a result file cannot tell.
-
-    frames: frames it was given while the object was being tracked or looked for; lost: those of them that were LOST.
-    false_tracks: frames with a pose although no pixel of the object can be seen.
-    """
-
-    frames: int
-    lost: int
-    false_tracks: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scores:
-    """metrics by name, AUCs, recalls and `over_*` in percent: over all instances together, as the mean of the objects'
-    values (counts summed), and of each object. NaN where there was not one instance."""
+    """metrics by name, AUCs, recalls and `over_*` in percent, `ar*` as fractions: over all instances together, as the
+    mean of the objects' values (counts summed), and of each object. NaN where there was not one instance."""
 
     protocol: Mapping[str, object]
     pooled: Metrics
@@ -77,27 +64,34 @@ def score(
     exclude: Collection[ObjectInImage] = frozenset(),
     protocol: Mapping[str, object] | None = None,
     tracking: Mapping[str, TrackingCounts] | None = None,
+    symmetric: Collection[str] | None = None,
+    with_vsd: bool = False,
 ) -> Scores:
     """Scores the estimates on the dataset's targets.
 
     scene_ids, object_ids: only those targets. exclude: the reference frames. protocol: conventions of the run; what
     scoring itself decides is added and prevails. tracking: by object, gives `lost_fraction` and `false_tracks`.
+    symmetric: the objects whose ADD(-S) is ADD-S, instead of those that the dataset declares; nothing else depends on
+    it. with_vsd: measure VSD too, which reads the depth of every image that has a target.
     Raises SourceError where the dataset does not have what is asked for.
     """
-    instances = measure(dataset, estimates, scene_ids, object_ids, exclude)
+    instances = measure(dataset, estimates, scene_ids, object_ids, exclude, symmetric, with_vsd)
     rows: dict[str, list[InstanceError]] = {}
     for row in instances.errors:
         rows.setdefault(row.object_id, []).append(row)
     counts = tracking or {}
     per_object = {
-        object_id: _metrics(of_object) | _tracking_metrics([counts[object_id]] if object_id in counts else [])
+        object_id: metrics_of(of_object) | tracking_metrics([counts[object_id]] if object_id in counts else [])
         for object_id, of_object in rows.items()
     }
+    pooled = metrics_of(instances.errors) | tracking_metrics(list(counts.values()))
+    mean = mean_of_objects(list(per_object.values()))
     stated = dict.fromkeys(STATED_BY_THE_RUN, "not stated") | dict(protocol or {})
     return Scores(
-        protocol=stated | _protocol(dataset, instances, scene_ids, tuple(rows)),
-        pooled=_metrics(instances.errors) | _tracking_metrics(list(counts.values())),
-        mean_of_objects=_mean(list(per_object.values())),
+        protocol=stated | _protocol(dataset, instances, scene_ids, tuple(rows), symmetric is not None, with_vsd),
+        pooled=pooled,
+        # the mean over those objects alone that have a mesh, say, would pass for that over all
+        mean_of_objects={name: value for name, value in mean.items() if name in pooled},
         per_object=per_object,
         instances=instances.errors,
     )
@@ -111,41 +105,30 @@ def score_results_file(
     object_ids: Sequence[str] | None = None,
     exclude: Collection[ObjectInImage] = frozenset(),
     protocol: Mapping[str, object] | None = None,
+    symmetric: Collection[str] | None = None,
+    with_vsd: bool = False,
 ) -> Scores:
-    """`score` of a BOP result file. Raises OutputError that names file and line where it cannot be read."""
-    told = {"results": str(results)} | dict(protocol or {})
+    """`score` of a BOP result file. Raises OutputError that names file and line where it cannot be read, and where an
+    estimate is of a scene, an image or an object that the dataset does not have."""
     return score(
-        dataset, read_results(results), scene_ids=scene_ids, object_ids=object_ids, exclude=exclude, protocol=told
+        dataset,
+        read_results(results, known_to(dataset)),
+        scene_ids=scene_ids,
+        object_ids=object_ids,
+        exclude=exclude,
+        protocol={"results": str(results)} | dict(protocol or {}),
+        symmetric=symmetric,
+        with_vsd=with_vsd,
     )
 
 
-def _metrics(rows: Sequence[InstanceError]) -> Metrics:
-    errors = {"add": np.array([r.add_m for r in rows]), "adds": np.array([r.adds_m for r in rows])}
-    limits_m = DIAMETER_SHARE * np.array([r.diameter_m for r in rows])
-    curves = {f"{name}_{curve}": auc(errors[name]) for curve, auc in CURVES.items() for name in errors}
-    recalls = {f"{name}_recall_{DIAMETER_SHARE}d": recall_below(errors[name], limits_m) for name in errors}
-    shares = {name: share_over(errors["add"], limit_m) for name, limit_m in OVER_M.items()}
-    return curves | shares | recalls | {"instances": len(rows), "missing": sum(r.missing for r in rows)}
-
-
-def _tracking_metrics(counts: Sequence[TrackingCounts]) -> Metrics:
-    """lost_fraction in [0, 1] and false_tracks of the counts together; nothing where nothing was counted."""
-    if not counts:
-        return {}
-    frames = sum(c.frames for c in counts)
-    lost_fraction = sum(c.lost for c in counts) / frames if frames else np.nan
-    return {"lost_fraction": lost_fraction, "false_tracks": sum(c.false_tracks for c in counts)}
-
-
-def _mean(objects: Sequence[Metrics]) -> Metrics:
-    """Mean over the objects that have the metric; counts are summed. Without objects, what pooling nothing gives."""
-    names = dict.fromkeys(name for metrics in objects for name in metrics)
-    values = {name: [metrics[name] for metrics in objects if name in metrics] for name in names}
-    return {name: sum(v) if name in COUNTS else float(np.mean(v)) for name, v in values.items()} or _metrics([])
-
-
 def _protocol(
-    dataset: Dataset, instances: Instances, scene_ids: Sequence[int] | None, object_ids: Sequence[str]
+    dataset: Dataset,
+    instances: Instances,
+    scene_ids: Sequence[int] | None,
+    object_ids: Sequence[str],
+    told_symmetric: bool,
+    with_vsd: bool,
 ) -> dict[str, object]:
     excluded = instances.excluded
     return {
@@ -153,8 +136,16 @@ def _protocol(
         "scenes": list(dataset.scene_ids if scene_ids is None else scene_ids),
         "objects": list(object_ids),
         "frames": dataset.target_rule,
-        "metrics": "ADD and ADD-S (ground truth -> estimate) of every object, over all model points",
+        "metrics": "ADD and ADD-S (ground truth -> estimate) of every object, over all model points; "
+        "ADD(-S): ADD-S for the symmetric objects, ADD for the others",
         "symmetric_objects": "not declared" if instances.symmetric is None else list(instances.symmetric),
+        "symmetric_objects_are": "the user's list" if told_symmetric else "the dataset's",
+        "symmetries": f"the dataset's; about an axis {STEPS} steps for MSSD and MSPD, {NOCS_STEPS} for the IoU of boxes "
+        "(as NOCS), every angle for 5 deg 2 cm and 10 deg 5 cm",
+        "average_recall": "error < threshold; MSSD 0.05 .. 0.50 diameters, MSPD 5 .. 50 px at a width of 640, "
+        "VSD 0.05 .. 0.50 at tau 0.05 .. 0.50 diameters; pooled over targets",
+        "mspd": "measured" if instances.no_cameras is None else f"not measured: {instances.no_cameras}",
+        "vsd": _about_vsd(instances.without_mesh, with_vsd),
         "integration": "VOCap; the keys that end in _exact: exact",
         "auc_thresholds_m": [AUC_THRESHOLD_M, FINE_THRESHOLD_M],
         "recall": f"error < {DIAMETER_SHARE} diameter",
@@ -165,6 +156,14 @@ def _protocol(
         "estimates_of_no_target": instances.ignored,
         "surplus_estimates": instances.surplus,
     }
+
+
+def _about_vsd(without_mesh: Sequence[str], with_vsd: bool) -> str:
+    if not with_vsd:
+        return "not measured: it was not asked for"
+    if without_mesh:
+        return f"not measured: no mesh, only points, of {', '.join(without_mesh)}"
+    return f"BOP19, delta {1000 * DELTA_M:.0f} mm, distance images"
 
 
 def _without_nan(metrics: Metrics) -> dict[str, float | None]:

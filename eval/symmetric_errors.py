@@ -1,7 +1,7 @@
 """Errors that take the best over an object's symmetries: MSSD, MSPD and the rotation error.
 
-MSSD and MSPD: Hodan et al. 2020, "BOP Challenge 2020 on 6D Object Localization", section 2.2. They are a minimum over up
-to 630 motions of a maximum over thousands of vertices, and exact, but few of the products are looked at: the error at
+MSSD and MSPD: Hodan et al. 2020, "BOP Challenge 2020 on 6D Object Localization", section 2.2. They are a minimum over
+up to 630 motions of a maximum over thousands of vertices, and exact, but few of the pairs are looked at: the error at
 some vertices is a lower bound of the maximum over all of them. The motion of the least bound is measured in full; the
 vertex where it is worst raises the bounds of the others; when no bound is under the best maximum, that is the minimum.
 """

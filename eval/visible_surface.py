@@ -76,8 +76,8 @@ def vsd(
 def discrepancy(scene_m: Floats, estimated_m: Floats, true_m: Floats, diameter_m: float) -> Floats:
     """(10,) VSD for TAUS from three distance images (H, W) in metres, 0 where there is nothing.
 
-    Of the pixels where either surface is seen, the share where only one is, or where they are tau or more apart; 1 where
-    neither is seen at all.
+    Of the pixels where either surface is seen, the share where only one is, or where they are tau or more apart; 1
+    where neither is seen at all.
     """
     seen_true = _seen(true_m, scene_m)
     seen = _seen(estimated_m, scene_m) | (seen_true & (estimated_m > 0))

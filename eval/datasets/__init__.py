@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+import numpy as np
+import numpy.typing as npt
+
+from eval.symmetries import ASYMMETRIC, ObjectSymmetries
 from tracker.errors import SourceError
-from tracker.geometry import Floats, Pose
+from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.sources import PosedSource
 
 LEAST_VISIBLE_FRACTION = 0.1  # BOP: an instance of which less can be seen is no target
@@ -35,11 +39,27 @@ class ObjectModel:
 
     points_m: (N, 3) object coordinates. diameter_m: the largest distance between two of its points, as the dataset
     says. symmetric: whether the dataset declares a symmetry; None where it declares nothing about any object.
+    symmetries: which motions look the same. triangles: (M, 3) indices into the mesh's vertices; None for a cloud of
+    points, of which no picture can be rendered. vertices_m: (V, 3) of the mesh, None where they are the points.
     """
 
     points_m: Floats
     diameter_m: float
     symmetric: bool | None
+    symmetries: ObjectSymmetries = ASYMMETRIC
+    triangles: npt.NDArray[np.integer] | None = None
+    vertices_m: Floats | None = None
+
+    @property
+    def mesh_vertices_m(self) -> Floats:
+        return self.points_m if self.vertices_m is None else self.vertices_m
+
+
+@runtime_checkable
+class CameraSource(Protocol):
+    """A source that tells a frame's camera without reading its pictures. Of one that does not, the frame is read."""
+
+    def camera(self, index: int) -> Intrinsics: ...
 
 
 class Dataset(Protocol):

@@ -17,8 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from eval.datasets import LEAST_VISIBLE_FRACTION, ObjectModel, Target, require
+from eval.symmetries import ObjectSymmetries
 from tracker.errors import SourceError
 from tracker.geometry import Floats
 from tracker.sources import Sighting
@@ -85,13 +87,13 @@ class BopDataset:
         try:
             entry = info[object_id]
             diameter_m = float(entry["diameter"]) / 1000
-            symmetric = bool(entry.get("symmetries_discrete") or entry.get("symmetries_continuous"))
+            symmetries = ObjectSymmetries.from_models_info(entry)
             declared = any(key.startswith("symmetries_") for other in info.values() for key in other)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise SourceError(f"{folder}/models_info.json: object {object_id}: {error!r}") from error
-        points_m = _read_vertices_m(folder / f"obj_{int(object_id):06d}.ply")
+        points_m, triangles = _read_mesh(folder / f"obj_{int(object_id):06d}.ply")
         _check_units(folder, object_id, points_m, diameter_m)
-        return ObjectModel(points_m, diameter_m, symmetric if declared else None)
+        return ObjectModel(points_m, diameter_m, not symmetries.trivial if declared else None, symmetries, triangles)
 
     def number(self, object_id: str) -> int:
         if not object_id.isdecimal():
@@ -146,18 +148,20 @@ def _read_json(path: Path) -> Any:
         raise SourceError(f"{path}: not JSON ({error})") from error
 
 
-def _read_vertices_m(path: Path) -> Floats:
-    """(N, 3) metres: the vertices as the file has them, none merged and none split at texture seams."""
+def _read_mesh(path: Path) -> tuple[Floats, npt.NDArray[np.integer] | None]:
+    """(N, 3) metres: the vertices as the file has them, none merged and none split at texture seams; and (M, 3) indices
+    of its triangles, None where it has none."""
     import trimesh
 
     try:
         mesh = trimesh.load(path, process=False, fix_texture=False, skip_materials=True)
         points_m = np.asarray(getattr(mesh, "vertices", ()), np.float64) / 1000
+        triangles = np.asarray(getattr(mesh, "faces", ()), np.int64).reshape(-1, 3)
     except Exception as error:  # the parser raises what it stumbles over
         raise SourceError(f"{path}: not a PLY file that can be read ({error!r})") from error
     if points_m.ndim != 2 or not len(points_m) or not np.isfinite(points_m).all():
         raise SourceError(f"{path}: expected finite vertices, got shape {points_m.shape}")
-    return points_m
+    return points_m, triangles if len(triangles) else None
 
 
 def _check_units(folder: Path, object_id: str, points_m: Floats, diameter_m: float) -> None:

@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from eval.datasets import LEAST_VISIBLE_FRACTION, ObjectModel, Target, require
+from eval.symmetries import ASYMMETRIC, ObjectSymmetries
 from tracker.geometry import Floats
 from tracker.sources import PosedSource
 
 SCENE_ID = 1
+TURNS_ABOUT_Z = ObjectSymmetries.listed(axes=[[0, 0, 1]], offsets_m=[[0, 0, 0]])
 
 
 class Shape(Protocol):
-    """What the renderer knows of an object: (N, 3) points in metres, their diameter, and its symmetry."""
+    """What the renderer knows of an object: (N, 3) points in metres, their diameter, whether every turn about z looks
+    the same, and the mesh, (V, 3) vertices in metres and (M, 3) triangles."""
 
     @property
     def points_m(self) -> Floats: ...
@@ -23,6 +29,12 @@ class Shape(Protocol):
 
     @property
     def symmetric(self) -> bool: ...
+
+    @property
+    def vertices_m(self) -> Floats: ...
+
+    @property
+    def triangles(self) -> npt.NDArray[np.integer]: ...
 
 
 class ShapedSource(PosedSource, Protocol):
@@ -63,7 +75,9 @@ class SyntheticDataset:
     def model(self, object_id: str) -> ObjectModel:
         require("object", object_id, self.object_ids, self.name)
         shape = self._scene.shape(object_id)
-        return ObjectModel(shape.points_m, shape.diameter_m, shape.symmetric)
+        symmetries = TURNS_ABOUT_Z if shape.symmetric else ASYMMETRIC
+        mesh = shape.triangles, shape.vertices_m
+        return ObjectModel(shape.points_m, shape.diameter_m, shape.symmetric, symmetries, *mesh)
 
     def number(self, object_id: str) -> int:
         require("object", object_id, self.object_ids, self.name)

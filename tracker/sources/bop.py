@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -56,26 +57,39 @@ class BopScene:
     def __getitem__(self, index: int) -> Frame:
         image_id = self.image_ids[index]
         try:
-            camera = self._cameras[image_id]
-            matrix, unit_mm = np.reshape(camera["cam_K"], (3, 3)), float(camera["depth_scale"])
+            unit_mm = float(self._cameras[image_id]["depth_scale"])
         except DAMAGE as error:
             raise SourceError(f"{self._folder}/scene_camera.json: image {image_id}: {error!r}") from error
         rgb = read_rgb(self._image_file("rgb", image_id))
         depth_m = read_depth_m(self._image_file("depth", image_id), unit_mm / 1000)
-        height, width = rgb.shape[:2]
-        try:
-            intrinsics = Intrinsics.from_matrix(matrix, width, height)
-        except FrameError as error:
-            raise FrameError(f"{self._folder}/scene_camera.json: image {image_id}: {error}") from error
         return Frame(
             rgb=rgb,
             depth_m=depth_m,
-            intrinsics=intrinsics,
+            intrinsics=self._intrinsics(image_id, rgb.shape[1], rgb.shape[0]),
             stamp_ns=round(image_id * 1e9 / NOMINAL_RATE_HZ),
             masks=self._masks(image_id),
             index=index,
             provenance=Provenance(f"{self.name} image {image_id}", "nominal", 0, unit_mm / 1000),
         )
+
+    def camera(self, index: int) -> Intrinsics:
+        """Of a frame, whose pictures are not read: they have the size of the scene's first one, as in all of BOP's."""
+        width, height = self._picture_size
+        return self._intrinsics(self.image_ids[index], width, height)
+
+    @cached_property
+    def _picture_size(self) -> tuple[int, int]:
+        height, width = read_rgb(self._image_file("rgb", self.image_ids[0])).shape[:2]
+        return width, height
+
+    def _intrinsics(self, image_id: int, width: int, height: int) -> Intrinsics:
+        where = f"{self._folder}/scene_camera.json: image {image_id}"
+        try:
+            return Intrinsics.from_matrix(np.reshape(self._cameras[image_id]["cam_K"], (3, 3)), width, height)
+        except DAMAGE as error:
+            raise SourceError(f"{where}: {error!r}") from error
+        except FrameError as error:
+            raise FrameError(f"{where}: {error}") from error
 
     @property
     def object_ids(self) -> tuple[str, ...]:

@@ -63,6 +63,10 @@ class SyntheticScene:
             provenance=Provenance(self.name, "synthetic"),
         )
 
+    def camera(self, index: int) -> Intrinsics:  # noqa: ARG002
+        """The same in every frame."""
+        return self.intrinsics
+
     @property
     def object_ids(self) -> tuple[str, ...]:
         return tuple(placed.thing.name for placed in self._layout.tracked)

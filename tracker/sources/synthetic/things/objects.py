@@ -16,7 +16,7 @@ from tracker.geometry import Floats
 from tracker.sources.synthetic.things import cereal_prints, tea_prints
 from tracker.sources.synthetic.things.clamp import clamp
 from tracker.sources.synthetic.things.drawing import Picture
-from tracker.sources.synthetic.things.mesh import surface_samples
+from tracker.sources.synthetic.things.mesh import Ints, surface_samples
 from tracker.sources.synthetic.things.solids import box
 from tracker.sources.synthetic.things.texture import glossy, pack
 from tracker.sources.synthetic.things.thing import Thing
@@ -27,14 +27,16 @@ SURFACE_SAMPLES = 4000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectShape:
-    """What an evaluation needs: (N, 3) points on the surface in the object frame, the diameter, the symmetry.
+    """What an evaluation needs: (N, 3) points on the surface in the object frame, the diameter, the symmetry, the mesh.
 
-    symmetric: any turn about the object's z axis looks the same.
+    symmetric: any turn about the object's z axis looks the same. vertices_m: (V, 3). triangles: (M, 3) indices of them.
     """
 
     points_m: Floats
     diameter_m: float
     symmetric: bool
+    vertices_m: Floats
+    triangles: Ints
 
 
 def _carton(
@@ -65,4 +67,6 @@ def tracked_object(object_id: str) -> Thing:
 @cache
 def shape_of(object_id: str) -> ObjectShape:
     thing = tracked_object(object_id)
-    return ObjectShape(surface_samples(thing.mesh, SURFACE_SAMPLES), thing.mesh.diameter_m, thing.symmetric)
+    mesh = thing.mesh
+    points_m = surface_samples(mesh, SURFACE_SAMPLES)
+    return ObjectShape(points_m, mesh.diameter_m, thing.symmetric, mesh.vertices_m, mesh.faces)
