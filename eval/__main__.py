@@ -12,6 +12,7 @@ import tyro
 
 from eval.bench.registration import RegistrationBench
 from eval.bench.saliency import SaliencyBench
+from eval.bench.scoring import ScoringBench
 from tracker.terminal import STDERR, progress, run
 
 if TYPE_CHECKING:
@@ -50,6 +51,10 @@ class Track:
     """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
     poses: Literal["filtered", "raw"] = "filtered"
     """Which poses are scored: after the filter, or of each frame alone."""
+    symmetric: tuple[str, ...] | None = None
+    """The objects whose ADD(-S) is ADD-S. Default: those that the dataset declares symmetric."""
+    vsd: bool = False
+    """Measure VSD too, and with it BOP's AR: reads the depth of every image with a target once more."""
     config: Path | None = None
     """YAML file with settings that differ from the defaults."""
     out: Path | None = None
@@ -66,7 +71,7 @@ class Track:
         from eval.datasets import open_dataset
         from eval.peers import method_kind
         from eval.predict import Protocol, track_dataset
-        from eval.report import environment, table, write_html, write_scores
+        from eval.report import environment, tables, write_html, write_scores
         from eval.score import score
         from reference.vocabulary import read_vocabulary
         from tracker.config import dump_config, read_config
@@ -114,6 +119,8 @@ class Track:
                     "models_refused": tracked.refused,
                 },
                 tracking=tracked.counts,
+                symmetric=self.symmetric,
+                with_vsd=self.vsd,
             )
             latency_ms = tracked.latency_ms()
             if folder:
@@ -123,7 +130,8 @@ class Track:
                 write_html(folder / "report.html", scores, extra, f"Tracking {self.dataset}")
                 (folder / "config.yaml").write_text(dump_config(config))
         who = f"backend {self.backend}" if kind.concepts else f"method {self.method}"
-        STDERR.print(table(scores, f"{self.dataset}, {self.views} views, {who}"))
+        for each in tables(scores, f"{self.dataset}, {self.views} views, {who}"):
+            STDERR.print(each)
         if latency_ms:
             STDERR.print(f"an object and frame: median {latency_ms['median']:.1f} ms, p95 {latency_ms['p95']:.1f} ms")
         if self.out:
@@ -144,12 +152,16 @@ class Score:
     """Only these scenes."""
     objects: tuple[str, ...] | None = None
     """Only these objects."""
+    symmetric: tuple[str, ...] | None = None
+    """The objects whose ADD(-S) is ADD-S. Default: those that the dataset declares symmetric."""
+    vsd: bool = False
+    """Measure VSD too, and with it BOP's AR: reads the depth of every image with a target."""
     overwrite: bool = False
     """Replace the file if it exists."""
 
     def __call__(self) -> None:
         from eval.datasets import open_dataset
-        from eval.report import environment, table, write_html, write_scores
+        from eval.report import environment, tables, write_html, write_scores
         from eval.score import score_results_file
         from tracker.output import require_free
 
@@ -157,21 +169,30 @@ class Score:
             for path in (self.out, self.out.with_suffix(".html")):
                 require_free(path, self.overwrite)
         dataset = open_dataset(self.dataset)
-        scores = score_results_file(dataset, self.results, scene_ids=self.scenes, object_ids=self.objects)
+        scores = score_results_file(
+            dataset,
+            self.results,
+            scene_ids=self.scenes,
+            object_ids=self.objects,
+            symmetric=self.symmetric,
+            with_vsd=self.vsd,
+        )
         if self.out:
             self.out.parent.mkdir(parents=True, exist_ok=True)
             write_html(self.out.with_suffix(".html"), scores, {"environment": environment()}, f"{self.results}")
             write_scores(self.out, scores, {"environment": environment()})
-        STDERR.print(table(scores, f"{self.results} on {self.dataset}"))
+        for each in tables(scores, f"{self.results} on {self.dataset}"):
+            STDERR.print(each)
 
 
 @dataclass
 class Bench:
-    """Measure speed, as ratios between ways of the same work in one run."""
+    """Measure speed: of saliency and registration as ratios between ways of the same work in one run."""
 
     what: tyro.conf.OmitArgPrefixes[
         Annotated[SaliencyBench, tyro.conf.subcommand("saliency", prefix_name=False)]
         | Annotated[RegistrationBench, tyro.conf.subcommand("registration", prefix_name=False)]
+        | Annotated[ScoringBench, tyro.conf.subcommand("scoring", prefix_name=False)]
     ]
 
     def __call__(self) -> None:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from tracker.geometry import Floats
 
 SHARES = np.arange(1, 11) / 20  # of the diameter for MSSD, of the surface for VSD: 0.05, 0.10 .. 0.50
-PIXELS = np.arange(5, 51, 5)
+PIXELS = 5.0 * np.arange(1, 11)
 
 
 def ar_mssd(errors_m: npt.ArrayLike, diameters_m: npt.ArrayLike) -> float:

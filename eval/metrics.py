@@ -7,7 +7,6 @@ Nothing here knows of symmetries: `eval.symmetric_errors` holds the errors that 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,9 +15,7 @@ from scipy.spatial import KDTree
 
 from tracker.geometry import Floats, Pose
 
-NEAR = (
-    0.2  # of the diagonal of the model's box: a shift up to which poses are good, and one tree is faster than another
-)
+NEAR = 0.2  # of the diagonal of the model's box: up to such a shift of the middle one tree is faster than another
 
 
 def add(points_m: Floats, estimated: Sequence[Pose], truth: Sequence[Pose]) -> Floats:
@@ -82,8 +79,8 @@ def _mean_length(vectors: Floats) -> float:
 class _MeanDistance:
     """Mean distance of points to their nearest ones of a model, by whichever tree is faster; both are exact.
 
-    On scans of 8,000 vertices small_gicp's takes half of the time of scipy's where poses are good, and ten times as long
-    where they are far off.
+    On scans of 8,000 vertices small_gicp's takes half of the time of scipy's where poses are good, and ten times as
+    long where they are far off. In one thread: on a busy machine those of OpenMP wait for each other.
     """
 
     def __init__(self, points_m: Floats) -> None:
@@ -95,5 +92,5 @@ class _MeanDistance:
     def __call__(self, points_m: Floats) -> float:
         if np.linalg.norm(points_m.mean(axis=0) - self._middle_m) > self._reach_m:
             return float(np.mean(self._far.query(points_m, workers=-1)[0]))
-        squares = self._near.batch_nearest_neighbor_search(points_m, num_threads=os.cpu_count() or 1)[1]
+        squares = self._near.batch_nearest_neighbor_search(points_m, num_threads=1)[1]
         return float(np.sqrt(squares).mean())

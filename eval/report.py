@@ -18,8 +18,9 @@ from eval.plots import error_curve, error_over_time
 from eval.score import Metrics, Scores
 from tracker.errors import OutputError
 
-# name in scores.json -> heading, digits
-COLUMNS = {
+Columns = Mapping[str, tuple[str, int]]  # name in scores.json -> heading, digits
+
+COLUMNS: Columns = {
     "add_auc": ("ADD", 1),
     "adds_auc": ("ADD-S", 1),
     "add_auc_2cm": ("ADD 2cm", 1),
@@ -32,6 +33,23 @@ COLUMNS = {
 LEGEND = (
     "ADD and ADD-S: area under the curve up to 10 cm and, 2cm, up to 2 cm, in percent (VOCap). > 1cm: percent of the "
     "n instances with an ADD over 1 cm. missing: instances without a pose. false: poses of what cannot be seen."
+)
+POSE_COLUMNS: Columns = {
+    "ar": ("AR", 3),
+    "ar_vsd": ("VSD", 3),
+    "ar_mssd": ("MSSD", 3),
+    "ar_mspd": ("MSPD", 3),
+    "add_or_adds_auc": ("ADD(-S)", 1),
+    "add_or_adds_recall_0.1d": ("0.1d", 1),
+    "recall_5deg_2cm": ("5°2cm", 1),
+    "recall_10deg_5cm": ("10°5cm", 1),
+    "iou_recall_50": ("IoU50", 1),
+    "iou_recall_75": ("IoU75", 1),
+}
+POSE_LEGEND = (
+    "AR: BOP's average recall, the mean of those by VSD, MSSD and MSPD. ADD(-S): ADD-S of the symmetric objects, ADD of "
+    "the others; AUC up to 10 cm, and percent under 0.1 diameters. Then percent of the poses within an angle and a "
+    "distance, and with a 3D IoU of the boxes over 50 and 75 %. -: not measured, the protocol says why."
 )
 PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")
 
@@ -63,32 +81,35 @@ def write_figures(path: Path, figures: Mapping[str, object]) -> None:
         raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
 
 
-def table(scores: Scores, title: str) -> Table:
+def tables(scores: Scores, title: str) -> list[Table]:
+    """Of ADD and ADD-S, and of BOP's and the other errors."""
+    return [table(scores, title), table(scores, "poses", POSE_COLUMNS, POSE_LEGEND)]
+
+
+def table(scores: Scores, title: str, columns: Columns = COLUMNS, legend: str = LEGEND) -> Table:
     """One row an object, the mean of objects, and all instances pooled."""
-    out = Table(title=title, caption=LEGEND, caption_justify="left", box=SIMPLE_HEAD, padding=(0, 0), pad_edge=False)
-    for heading in ("object", *(heading for heading, _ in COLUMNS.values())):
+    out = Table(title=title, caption=legend, caption_justify="left", box=SIMPLE_HEAD, padding=(0, 0), pad_edge=False)
+    for heading in ("object", *(heading for heading, _ in columns.values())):
         out.add_column(heading, justify="left" if heading == "object" else "right", no_wrap=True)
     for name, metrics in scores.per_object.items():
-        out.add_row(name, *_cells(metrics))
+        out.add_row(name, *_cells(metrics, columns))
     out.add_section()
-    out.add_row("mean of objects", *_cells(scores.mean_of_objects))
-    out.add_row("pooled", *_cells(scores.pooled), style="bold")
+    out.add_row("mean of objects", *_cells(scores.mean_of_objects, columns))
+    out.add_row("pooled", *_cells(scores.pooled, columns), style="bold")
     return out
 
 
 def write_html(path: Path, scores: Scores, extra: Mapping[str, object], title: str) -> None:
     """report.html: tables, curves and the whole protocol in one file without a script or a link."""
-    rows = [_row(name, metrics) for name, metrics in scores.per_object.items()]
-    rows += [_row("mean of objects", scores.mean_of_objects), _row("pooled", scores.pooled)]
-    headings = "".join(f"<th>{escape(h)}</th>" for h in ("object", *(heading for heading, _ in COLUMNS.values())))
     errors = {
         "ADD": np.array([row.add_m for row in scores.instances]),
         "ADD-S": np.array([row.adds_m for row in scores.instances]),
     }
     sections = [
         f"<h1>{escape(title)}</h1>",
-        f"<div class=wide><table><thead><tr>{headings}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>",
-        f"<p>{escape(LEGEND)}</p>",
+        *_html_table(scores, COLUMNS, LEGEND),
+        "<h2>BOP's average recall, and other errors</h2>",
+        *_html_table(scores, POSE_COLUMNS, POSE_LEGEND),
         "<h2>How large are the errors?</h2>",
         error_curve(errors),
         "<h2>When do they happen?</h2>",
@@ -101,14 +122,24 @@ def write_html(path: Path, scores: Scores, extra: Mapping[str, object], title: s
     path.write_text(PAGE.format(title=escape(title), body="\n".join(sections)), encoding="utf-8")
 
 
-def _cells(metrics: Metrics) -> list[str]:
-    values = {name: metrics.get(name, np.nan) for name in COLUMNS}
-    return ["-" if np.isnan(values[name]) else f"{values[name]:.{digits}f}" for name, (_, digits) in COLUMNS.items()]
+def _html_table(scores: Scores, columns: Columns, legend: str) -> list[str]:
+    rows = [_row(name, metrics, columns) for name, metrics in scores.per_object.items()]
+    rows += [_row("mean of objects", scores.mean_of_objects, columns), _row("pooled", scores.pooled, columns)]
+    headings = "".join(f"<th>{escape(h)}</th>" for h in ("object", *(heading for heading, _ in columns.values())))
+    return [
+        f"<div class=wide><table><thead><tr>{headings}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>",
+        f"<p>{escape(legend)}</p>",
+    ]
 
 
-def _row(name: str, metrics: Metrics) -> str:
+def _cells(metrics: Metrics, columns: Columns) -> list[str]:
+    values = {name: metrics.get(name, np.nan) for name in columns}
+    return ["-" if np.isnan(values[name]) else f"{values[name]:.{digits}f}" for name, (_, digits) in columns.items()]
+
+
+def _row(name: str, metrics: Metrics, columns: Columns) -> str:
     strong = ' class="total"' if name in ("pooled", "mean of objects") else ""
-    return f"<tr{strong}><td>{escape(name)}</td>{''.join(f'<td>{cell}</td>' for cell in _cells(metrics))}</tr>"
+    return f"<tr{strong}><td>{escape(name)}</td>{''.join(f'<td>{cell}</td>' for cell in _cells(metrics, columns))}</tr>"
 
 
 def _definitions(values: Mapping[str, object]) -> str:

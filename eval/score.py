@@ -140,8 +140,8 @@ def _protocol(
         "ADD(-S): ADD-S for the symmetric objects, ADD for the others",
         "symmetric_objects": "not declared" if instances.symmetric is None else list(instances.symmetric),
         "symmetric_objects_are": "the user's list" if told_symmetric else "the dataset's",
-        "symmetries": f"the dataset's; about an axis {STEPS} steps for MSSD and MSPD, {NOCS_STEPS} for the IoU of boxes "
-        "(as NOCS), every angle for 5 deg 2 cm and 10 deg 5 cm",
+        "symmetries": f"the dataset's; about an axis {STEPS} steps for MSSD and MSPD, {NOCS_STEPS} for the IoU of "
+        "boxes (as NOCS), every angle for 5 deg 2 cm and 10 deg 5 cm",
         "average_recall": "error < threshold; MSSD 0.05 .. 0.50 diameters, MSPD 5 .. 50 px at a width of 640, "
         "VSD 0.05 .. 0.50 at tau 0.05 .. 0.50 diameters; pooled over targets",
         "mspd": "measured" if instances.no_cameras is None else f"not measured: {instances.no_cameras}",

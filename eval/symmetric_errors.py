@@ -11,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from eval.metrics import rotation_error_deg, stack
 from eval.symmetries import Motions, ObjectSymmetries
 from tracker.geometry import Floats, Intrinsics, Pose
+
+Ints = npt.NDArray[np.int64]
 
 WIDTH_PX = 640  # to which BOP scales the images whose projections are compared
 FIRST_BOUNDS = 12  # vertices, far from each other, whose errors are the first bounds
@@ -122,15 +125,15 @@ def _least_maximum(bounds: Floats, at_vertex: Callable[[int], Floats], in_full: 
     return best
 
 
-def _hull(points_m: Floats) -> Floats:
+def _hull(points_m: Floats) -> Ints:
     """Indices of the corners of the convex hull; of all points where they have none, as in a plane."""
     try:
-        return ConvexHull(points_m).vertices
+        return np.asarray(ConvexHull(points_m).vertices, np.int64)
     except (QhullError, ValueError):  # flat, or fewer than four points
         return np.arange(len(points_m))
 
 
-def _far_apart(points_m: Floats) -> Floats:
+def _far_apart(points_m: Floats) -> Ints:
     """Indices of a few points by farthest-point sampling, first the one that is farthest from the middle."""
     chosen = [int(_squares(points_m - points_m.mean(axis=0)).argmax())]
     distances = _squares(points_m - points_m[chosen[0]])
