@@ -34,23 +34,32 @@ LEGEND = (
     "ADD and ADD-S: area under the curve up to 10 cm and, 2cm, up to 2 cm, in percent (VOCap). > 1cm: percent of the "
     "n instances with an ADD over 1 cm. missing: instances without a pose. false: poses of what cannot be seen."
 )
-POSE_COLUMNS: Columns = {
+BOP_COLUMNS: Columns = {
     "ar": ("AR", 3),
     "ar_vsd": ("VSD", 3),
     "ar_mssd": ("MSSD", 3),
     "ar_mspd": ("MSPD", 3),
     "add_or_adds_auc": ("ADD(-S)", 1),
+    "add_or_adds_auc_2cm": ("2cm", 1),
     "add_or_adds_recall_0.1d": ("0.1d", 1),
-    "recall_5deg_2cm": ("5°2cm", 1),
-    "recall_10deg_5cm": ("10°5cm", 1),
-    "iou_recall_50": ("IoU50", 1),
-    "iou_recall_75": ("IoU75", 1),
+}
+BOP_LEGEND = (
+    "AR: BOP's average recall, the mean of those by VSD, MSSD and MSPD. ADD(-S): ADD-S of the symmetric objects, ADD "
+    "of the others; areas up to 10 cm and 2 cm, and percent of the instances under 0.1 diameters. -: not measured, the "
+    "protocol says why."
+)
+POSE_COLUMNS: Columns = {
+    "recall_5deg_2cm": ("5° 2cm", 1),
+    "recall_10deg_5cm": ("10° 5cm", 1),
+    "iou_mean": ("IoU", 1),
+    "iou_recall_50": ("> 50%", 1),
+    "iou_recall_75": ("> 75%", 1),
 }
 POSE_LEGEND = (
-    "AR: BOP's average recall, the mean of those by VSD, MSSD and MSPD. ADD(-S): ADD-S of the symmetric objects, ADD of "
-    "the others; AUC up to 10 cm, and percent under 0.1 diameters. Then percent of the poses within an angle and a "
-    "distance, and with a 3D IoU of the boxes over 50 and 75 %. -: not measured, the protocol says why."
+    "Percent of the instances within an angle and a distance. IoU: mean 3D overlap of the bounding boxes, and percent of "
+    "the instances whose overlap is larger."
 )
+TABLES = (("", COLUMNS, LEGEND), ("BOP", BOP_COLUMNS, BOP_LEGEND), ("Poses and boxes", POSE_COLUMNS, POSE_LEGEND))
 PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")
 
 
@@ -82,12 +91,11 @@ def write_figures(path: Path, figures: Mapping[str, object]) -> None:
 
 
 def tables(scores: Scores, title: str) -> list[Table]:
-    """Of ADD and ADD-S, and of BOP's and the other errors."""
-    return [table(scores, title), table(scores, "poses", POSE_COLUMNS, POSE_LEGEND)]
+    """Narrow ones, each with a row an object, the mean of objects, and all instances pooled."""
+    return [_table(scores, heading or title, columns, legend) for heading, columns, legend in TABLES]
 
 
-def table(scores: Scores, title: str, columns: Columns = COLUMNS, legend: str = LEGEND) -> Table:
-    """One row an object, the mean of objects, and all instances pooled."""
+def _table(scores: Scores, title: str, columns: Columns, legend: str) -> Table:
     out = Table(title=title, caption=legend, caption_justify="left", box=SIMPLE_HEAD, padding=(0, 0), pad_edge=False)
     for heading in ("object", *(heading for heading, _ in columns.values())):
         out.add_column(heading, justify="left" if heading == "object" else "right", no_wrap=True)
@@ -107,9 +115,7 @@ def write_html(path: Path, scores: Scores, extra: Mapping[str, object], title: s
     }
     sections = [
         f"<h1>{escape(title)}</h1>",
-        *_html_table(scores, COLUMNS, LEGEND),
-        "<h2>BOP's average recall, and other errors</h2>",
-        *_html_table(scores, POSE_COLUMNS, POSE_LEGEND),
+        *(part for each in TABLES for part in _html_table(scores, *each)),
         "<h2>How large are the errors?</h2>",
         error_curve(errors),
         "<h2>When do they happen?</h2>",
@@ -122,11 +128,12 @@ def write_html(path: Path, scores: Scores, extra: Mapping[str, object], title: s
     path.write_text(PAGE.format(title=escape(title), body="\n".join(sections)), encoding="utf-8")
 
 
-def _html_table(scores: Scores, columns: Columns, legend: str) -> list[str]:
+def _html_table(scores: Scores, heading: str, columns: Columns, legend: str) -> list[str]:
     rows = [_row(name, metrics, columns) for name, metrics in scores.per_object.items()]
     rows += [_row("mean of objects", scores.mean_of_objects, columns), _row("pooled", scores.pooled, columns)]
     headings = "".join(f"<th>{escape(h)}</th>" for h in ("object", *(heading for heading, _ in columns.values())))
     return [
+        *([f"<h2>{escape(heading)}</h2>"] if heading else []),
         f"<div class=wide><table><thead><tr>{headings}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>",
         f"<p>{escape(legend)}</p>",
     ]

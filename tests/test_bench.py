@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from eval.bench.methods import THRESHOLD_M, open3d_fgr, open3d_ransac, ours, peers
 from eval.bench.problems import problem
 from eval.bench.registration import RegistrationBench
 from eval.bench.saliency import SaliencyBench
+from eval.bench.scored_models import OBJECTS, model, poses
+from eval.bench.scoring import ScoringBench
+from eval.symmetric_errors import mssd
 from tests.tiny_networks import save_siglip
 from tracker.errors import OutputError
 from tracker.geometry import Pose
@@ -50,6 +54,27 @@ def test_the_registration_bench_says_everything_that_it_is_asked_for(tmp_path: P
     assert figures["environment"]["torch"]
     with pytest.raises(OutputError, match=r"figures\.json exists"):
         bench()
+
+
+def test_the_scoring_bench_says_everything_that_it_is_asked_for(tmp_path: Path) -> None:
+    ScoringBench(instances=21, vertices=200, json=tmp_path / "figures.json")()
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert figures["seconds_for_10000"] > 0
+    assert set(figures["parts"]) == {"add", "adds", "mssd", "mspd", "iou"}
+    assert figures["settings"] == {"instances": 21, "objects": 21, "vertices": 200}
+    with pytest.raises(OutputError, match=r"figures\.json exists"):
+        ScoringBench(json=tmp_path / "figures.json")()
+
+
+def test_scored_models_have_the_symmetries_that_they_declare_and_estimates_near_to_them() -> None:
+    counts = [len(model(number, 50).symmetries.motions()) for number in range(1, OBJECTS + 1)]
+    assert {count: counts.count(count) for count in set(counts)} == {1: 13, 4: 3, 315: 3, 630: 2}
+    can = model(2, 300)
+    assert len(can.points_m) == 300
+    estimated, truth = poses(2, can.symmetries, 50)
+    errors_m = mssd(can.points_m, can.symmetries.motions(), estimated, truth)
+    assert 0.003 < np.median(errors_m) < 0.03
+    assert [p.matrix.tolist() for p in poses(2, can.symmetries, 50)[0]] == [p.matrix.tolist() for p in estimated]
 
 
 def test_the_saliency_bench_says_everything_that_it_is_asked_for(

@@ -48,6 +48,17 @@ def test_every_image_has_a_camera_of_its_own(bop_dataset: Path) -> None:
     }
 
 
+def test_a_camera_is_told_without_the_frame(bop_dataset: Path) -> None:
+    scene = BopScene(bop_dataset, 3)
+    cameras = [frame.intrinsics for frame in scene]
+    for picture in (bop_dataset / "test" / "000003" / "depth").iterdir():
+        picture.unlink()
+    assert [scene.camera(index) for index in range(3)] == cameras
+    edit(bop_dataset / "test" / "000003" / "scene_camera.json", lambda cameras: cameras["5"].pop("cam_K"))
+    with pytest.raises(SourceError, match=r"scene_camera\.json: image 5: KeyError"):
+        BopScene(bop_dataset, 3).camera(1)
+
+
 def test_poses_are_in_metres_and_rotations_row_by_row(bop_dataset: Path) -> None:
     first = BopScene(bop_dataset, 3).sightings("4")[0].T_cam_obj
     assert np.allclose(first @ np.array([[1.0, 0, 0]]), [[0.010, 1.002, 0.500]])

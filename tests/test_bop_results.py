@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from eval.bop_results import Estimate, read_results, write_results
-from tracker.errors import OutputError
+from tracker.errors import OutputError, SourceError
 from tracker.geometry import Pose
 
 HEADER = "scene_id,im_id,obj_id,score,R,t,time"
@@ -41,7 +41,7 @@ def written(tmp_path: Path, *lines: str) -> Path:
     return path
 
 
-@given(estimates=st.lists(estimates, max_size=4))
+@given(estimates=st.lists(estimates, max_size=4, unique_by=lambda e: (e.scene_id, e.image_id, e.object_id)))
 def test_a_round_trip_is_exact_to_the_bit_and_to_the_byte(estimates: list[Estimate]) -> None:
     with TemporaryDirectory() as folder:
         first, second = Path(folder) / "first.csv", Path(folder) / "second.csv"
@@ -74,7 +74,30 @@ def test_a_file_of_a_header_alone_has_no_estimates(tmp_path: Path) -> None:
 
 
 def test_several_estimates_of_one_object_are_all_read(tmp_path: Path) -> None:
-    assert len(read_results(written(tmp_path, HEADER, ROW, ROW))) == 2
+    assert len(read_results(written(tmp_path, HEADER, ROW, ROW.replace("0.9", "0.8")))) == 2
+
+
+def test_a_row_that_is_there_twice_is_named_with_the_first_one(tmp_path: Path) -> None:
+    others = ROW.replace("48,1", "48,2"), ROW.replace("10.5", "10.6")
+    with pytest.raises(OutputError, match=r"rbt-test\.csv, line 5: the same estimate as in line 2"):
+        read_results(written(tmp_path, HEADER, ROW, *others, ROW))
+
+
+def test_an_image_has_one_time(tmp_path: Path) -> None:
+    timed = [ROW.replace("-1", "0.25"), ROW.replace("-1", "0.25").replace("48,1,2", "48,1,3")]
+    assert [e.time_s for e in read_results(written(tmp_path, HEADER, *timed, ROW.replace("48,1", "48,2")))] == [0.25, 0.25, -1]
+    with pytest.raises(OutputError, match=r"rbt-test\.csv, line 4: time is -1 s, in line 2 0\.25 s"):
+        read_results(written(tmp_path, HEADER, *timed, ROW.replace("48,1,2", "48,1,4")))
+
+
+def test_what_a_check_refuses_is_named_by_its_line(tmp_path: Path) -> None:
+    def only_object_2(estimate: Estimate) -> None:
+        if estimate.object_id != 2:
+            raise SourceError(f"no object {estimate.object_id}")
+
+    path = written(tmp_path, HEADER, ROW, ROW.replace("48,1,2", "48,1,7"))
+    with pytest.raises(OutputError, match=r"rbt-test\.csv, line 3: no object 7"):
+        read_results(path, only_object_2)
 
 
 @pytest.mark.parametrize("digits", [3, 4, 6])

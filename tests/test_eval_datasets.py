@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from eval.datasets import Dataset, Target, open_dataset
@@ -120,6 +121,18 @@ def test_a_model_is_in_metres_with_every_vertex_of_its_file(bop: Path) -> None:
     model = BopDataset(bop).model("1")
     assert model.points_m.tolist() == (CORNERS_MM / 1000).tolist()
     assert model.diameter_m == pytest.approx(DIAMETER_MM / 1000)
+    assert model.triangles is not None
+    assert model.triangles.tolist() == [[0, 1, 2]]
+    assert model.mesh_vertices_m is model.points_m
+
+
+def test_a_cloud_of_points_has_no_triangles(bop: Path) -> None:
+    rows = "\n".join(" ".join(map(str, corner)) for corner in CORNERS_MM)
+    header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    (bop / "models" / "obj_000001.ply").write_text(header + rows + "\n")
+    model = BopDataset(bop).model("1")
+    assert model.triangles is None
+    assert len(model.points_m) == 8
 
 
 def test_vertices_of_the_same_place_are_not_merged(bop: Path) -> None:
@@ -137,8 +150,16 @@ def test_models_for_evaluation_come_before_the_others(bop: Path) -> None:
 def test_a_symmetry_is_declared_absent_or_not_spoken_of(bop: Path) -> None:
     dataset = BopDataset(bop)
     assert (dataset.model("1").symmetric, dataset.model("2").symmetric) == (False, True)
+    assert [len(dataset.model(name).symmetries.motions()) for name in ("1", "2")] == [1, 2]
     write_json(bop / "models" / "models_info.json", {"1": {"diameter": DIAMETER_MM}})
     assert dataset.model("1").symmetric is None
+
+
+def test_a_symmetry_that_cannot_be_one_is_named(bop: Path) -> None:
+    entry = {"diameter": DIAMETER_MM, "symmetries_discrete": [[2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]}
+    write_json(bop / "models" / "models_info.json", {"1": entry})
+    with pytest.raises(SourceError, match=r"models_info\.json: object 1: .*rotation"):
+        BopDataset(bop).model("1")
 
 
 @pytest.mark.parametrize(
@@ -200,6 +221,8 @@ class Box:
     points_m: Floats
     diameter_m: float = 0.08
     symmetric: bool = True
+    vertices_m: Floats = field(default_factory=lambda: CORNERS_MM / 1000)
+    triangles: npt.NDArray[np.int64] = field(default_factory=lambda: np.array([[0, 1, 2]]))
 
 
 class Scene:
@@ -229,7 +252,10 @@ def test_a_rendered_scene_is_a_dataset_of_one_scene() -> None:
     assert (dataset.name, dataset.scene_ids) == ("synthetic:table", (1,))
     assert list(dataset.image_ids(1)) == [0, 1]
     assert keys(dataset.targets(1)) == [(0, 0, "mug"), (0, 0, "tin"), (1, 1, "mug")]
-    assert (dataset.model("mug").diameter_m, dataset.model("mug").symmetric) == (0.08, True)
+    model = dataset.model("mug")
+    assert (model.diameter_m, model.symmetric, len(model.symmetries.motions())) == (0.08, True, 315)
+    assert model.triangles is not None
+    assert (model.triangles.tolist(), len(model.mesh_vertices_m), len(model.points_m)) == ([[0, 1, 2]], 8, 1)
 
 
 def test_rendered_objects_are_numbered_by_the_order_of_their_names() -> None:

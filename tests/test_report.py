@@ -14,7 +14,7 @@ from rich.console import Console
 
 from eval.instances import InstanceError
 from eval.plots import HEIGHT, LARGEST_MM, WIDTH, error_curve, error_over_time
-from eval.report import COLUMNS, environment, table, write_html, write_scores
+from eval.report import TABLES, environment, tables, write_html, write_scores
 from eval.score import Metrics, Scores
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
@@ -63,11 +63,12 @@ class Page(HTMLParser):
 
 def instance(image_id: int, add_m: float, object_id: str = "mug", scene_id: int = 1) -> InstanceError:
     missing = not np.isfinite(add_m)
-    return InstanceError(scene_id, image_id, object_id, 0.12, add_m, add_m / 2, 1.0, add_m, missing)
+    errors = (0.12, add_m, add_m / 2, 1.0, add_m, missing, 1.0, add_m, 5.0, 0.5, None, None)
+    return InstanceError(scene_id, image_id, object_id, *errors)
 
 
 def metrics(start: float) -> Metrics:
-    return {name: start + k / 7 for k, name in enumerate(COLUMNS)}
+    return {name: start + k / 7 for k, name in enumerate(name for _, columns, _ in TABLES for name in columns)}
 
 
 ROWS = (instance(0, 0.001), instance(1, 0.006), instance(2, 0.015), instance(3, np.inf), instance(7, 0.3, scene_id=4))
@@ -101,13 +102,15 @@ def test_the_page_stands_alone_without_a_script_or_a_link(page: Page, tmp_path: 
     assert not re.search(r"https?:|//|@import|url\(", text)
 
 
-def test_the_table_of_the_page_holds_the_numbers(page: Page) -> None:
-    heading, *rows = page.rows
-    assert heading == ["object", *(name for name, _ in COLUMNS.values())]
-    assert [row[0] for row in rows] == ["mug", "a <b> & 'c'", "mean of objects", "pooled"]
-    expected = (*SCORES.per_object.values(), SCORES.mean_of_objects, SCORES.pooled)
-    for row, values in zip(rows, expected, strict=True):
-        assert row[1:] == [f"{values[name]:.{digits}f}" for name, (_, digits) in COLUMNS.items()]
+def test_the_tables_of_the_page_hold_the_numbers(page: Page) -> None:
+    for k, (_, columns, _) in enumerate(TABLES):
+        heading, *rows = page.rows[5 * k : 5 * k + 5]
+        assert heading == ["object", *(name for name, _ in columns.values())]
+        assert [row[0] for row in rows] == ["mug", "a <b> & 'c'", "mean of objects", "pooled"]
+        expected = (*SCORES.per_object.values(), SCORES.mean_of_objects, SCORES.pooled)
+        for row, values in zip(rows, expected, strict=True):
+            assert row[1:] == [f"{values[name]:.{digits}f}" for name, (_, digits) in columns.items()]
+    assert len(page.rows) == 5 * len(TABLES)
 
 
 def test_the_page_holds_the_whole_protocol_and_what_is_beside_it(page: Page) -> None:
@@ -125,8 +128,9 @@ def test_a_metric_that_was_not_measured_is_a_dash(tmp_path: Path) -> None:
     some = {"add_auc": 50.0, "adds_auc": float("nan"), "instances": 3}
     scores = Scores({}, some, some, {"mug": some}, ())
     write_html(tmp_path / "report.html", scores, {}, "empty")
-    for row in Page((tmp_path / "report.html").read_text()).rows[1:]:
-        assert row[1:] == ["50.0", "-", "-", "-", "-", "3", "-", "-"]
+    rows = Page((tmp_path / "report.html").read_text()).rows
+    assert [row[1:] for row in rows[1:4]] == [["50.0", "-", "-", "-", "-", "3", "-", "-"]] * 3
+    assert {cell for row in (*rows[5:8], *rows[9:]) for cell in row[1:]} == {"-"}
 
 
 def test_the_curve_is_the_share_of_instances_under_each_error() -> None:
@@ -189,23 +193,23 @@ def test_what_json_cannot_hold_is_null_or_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "other.json").exists()
 
 
-def test_the_table_of_the_terminal_has_a_row_an_object_and_the_two_summaries() -> None:
-    names, *columns = (list(column.cells) for column in table(SCORES, "Tracking").columns)
-    assert names == ["mug", "a <b> & 'c'", "mean of objects", "pooled"]
-    values = (*SCORES.per_object.values(), SCORES.mean_of_objects, SCORES.pooled)
-    for cells, (name, (_, digits)) in zip(columns, COLUMNS.items(), strict=True):
-        assert cells == [f"{v[name]:.{digits}f}" for v in values]
+def test_the_tables_of_the_terminal_have_a_row_an_object_and_the_two_summaries() -> None:
+    for drawn, (_, columns, _) in zip(tables(SCORES, "Tracking"), TABLES, strict=True):
+        names, *cells_of = (list(column.cells) for column in drawn.columns)
+        assert names == ["mug", "a <b> & 'c'", "mean of objects", "pooled"]
+        values = (*SCORES.per_object.values(), SCORES.mean_of_objects, SCORES.pooled)
+        for cells, (name, (_, digits)) in zip(cells_of, columns.items(), strict=True):
+            assert cells == [f"{v[name]:.{digits}f}" for v in values]
 
 
-def test_the_table_fits_a_terminal_of_eighty_columns() -> None:
+@pytest.mark.parametrize("which", range(len(TABLES)))
+def test_the_tables_fit_a_terminal_of_eighty_columns(which: int) -> None:
     console = Console(width=80)
     with console.capture() as captured:
-        console.print(table(SCORES, "Tracking"))
-    numbers = [line for line in captured.get().splitlines() if line.strip().startswith("pooled")]
-    assert NUMBERS.findall(numbers[0])[-2:] == [
-        f"{SCORES.pooled['missing']:.0f}",
-        f"{SCORES.pooled['false_tracks']:.0f}",
-    ]
+        console.print(tables(SCORES, "Tracking")[which])
+    (line,) = [line for line in captured.get().splitlines() if line.strip().startswith("pooled")]
+    columns = TABLES[which][1]
+    assert NUMBERS.findall(line) == [f"{SCORES.pooled[name]:.{digits}f}" for name, (_, digits) in columns.items()]
 
 
 def test_the_environment_is_told_by_versions() -> None:
