@@ -56,8 +56,8 @@ POSE_COLUMNS: Columns = {
     "iou_recall_75": ("> 75%", 1),
 }
 POSE_LEGEND = (
-    "Percent of the instances within an angle and a distance. IoU: mean 3D overlap of the bounding boxes, and percent of "
-    "the instances whose overlap is larger."
+    "Percent of the instances within an angle and a distance. IoU: mean 3D overlap of the bounding boxes, and percent "
+    "of the instances whose overlap is larger."
 )
 TABLES = (("", COLUMNS, LEGEND), ("BOP", BOP_COLUMNS, BOP_LEGEND), ("Poses and boxes", POSE_COLUMNS, POSE_LEGEND))
 PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")

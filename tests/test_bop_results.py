@@ -85,7 +85,11 @@ def test_a_row_that_is_there_twice_is_named_with_the_first_one(tmp_path: Path) -
 
 def test_an_image_has_one_time(tmp_path: Path) -> None:
     timed = [ROW.replace("-1", "0.25"), ROW.replace("-1", "0.25").replace("48,1,2", "48,1,3")]
-    assert [e.time_s for e in read_results(written(tmp_path, HEADER, *timed, ROW.replace("48,1", "48,2")))] == [0.25, 0.25, -1]
+    assert [e.time_s for e in read_results(written(tmp_path, HEADER, *timed, ROW.replace("48,1", "48,2")))] == [
+        0.25,
+        0.25,
+        -1,
+    ]
     with pytest.raises(OutputError, match=r"rbt-test\.csv, line 4: time is -1 s, in line 2 0\.25 s"):
         read_results(written(tmp_path, HEADER, *timed, ROW.replace("48,1,2", "48,1,4")))
 

@@ -404,6 +404,21 @@ def test_eval_score_scores_what_eval_track_wrote(evaluated: Path, run: Run, tmp_
     assert f"{scores['metrics']['pooled']['adds_auc']:.1f}" in said.err
 
 
+def test_eval_score_measures_vsd_and_takes_a_list_of_symmetric_objects(
+    evaluated: Path, run: Run, tmp_path: Path
+) -> None:
+    line = ("--results", evaluated / "results.csv", "--vsd", "--symmetric", BOX, "--out", tmp_path / "mine.json")
+    said = run("eval", "score", "--dataset", SOURCE, *line)
+    assert (said.code, said.out) == (0, ""), said.err
+    scores = json.loads((tmp_path / "mine.json").read_text())
+    pooled, protocol = scores["metrics"]["pooled"], scores["protocol"]
+    assert pooled["ar"] == pytest.approx(sum(pooled[f"ar_{name}"] for name in ("vsd", "mssd", "mspd")) / 3)
+    assert pooled["ar"] > 0.8
+    assert f"{pooled['ar_vsd']:.3f}" in said.err
+    assert pooled["add_or_adds_auc"] == pooled["adds_auc"]
+    assert (protocol["symmetric_objects"], protocol["symmetric_objects_are"]) == ([BOX], "the user's list")
+
+
 @pytest.mark.parametrize("name", ["mine.json", "mine.html"])
 def test_eval_score_replaces_scores_and_page_only_when_it_is_asked_to(
     name: str, evaluated: Path, run: Run, tmp_path: Path

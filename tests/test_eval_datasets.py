@@ -128,7 +128,9 @@ def test_a_model_is_in_metres_with_every_vertex_of_its_file(bop: Path) -> None:
 
 def test_a_cloud_of_points_has_no_triangles(bop: Path) -> None:
     rows = "\n".join(" ".join(map(str, corner)) for corner in CORNERS_MM)
-    header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    header = (
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    )
     (bop / "models" / "obj_000001.ply").write_text(header + rows + "\n")
     model = BopDataset(bop).model("1")
     assert model.triangles is None

@@ -4,27 +4,58 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from eval.bop_results import Estimate, write_results
-from eval.datasets import ObjectModel, Target, require
+from eval.datasets import ObjectModel, Target, open_dataset, require
 from eval.datasets.bop import BopDataset
 from eval.score import Scores, TrackingCounts, score, score_results_file
 from tracker.errors import OutputError, SourceError
-from tracker.geometry import Pose
-from tracker.sources import PosedSource
+from tracker.frame import Frame
+from tracker.geometry import Intrinsics, Pose
+from tracker.sources import PosedSource, Sighting
 
 KEYS = {
     *("add_auc", "adds_auc", "add_auc_exact", "adds_auc_exact"),
     *("add_auc_2cm", "adds_auc_2cm", "add_auc_2cm_exact", "adds_auc_2cm_exact"),
     *("over_1cm", "over_5cm", "add_recall_0.1d", "adds_recall_0.1d", "instances", "missing"),
+    *("add_or_adds_auc", "add_or_adds_auc_exact", "add_or_adds_auc_2cm", "add_or_adds_auc_2cm_exact"),
+    *("add_or_adds_recall_0.1d", "recall_5deg_2cm", "recall_10deg_5cm", "iou_mean", "iou_recall_50", "iou_recall_75"),
+    *("ar_mssd", "ar_mspd"),
 }
+CAMERA = Intrinsics(500.0, 500.0, 320.0, 240.0, 640, 480)
 IMAGES = {"cup": (0, 1, 2, 3, 4), "tin": (0, 1)}
 NUMBERS = {"cup": 1, "tin": 2}
+
+
+class Pictures:
+    """A scene whose pictures are lost."""
+
+    name = "memory:table:1"
+    object_ids = ("cup", "tin")
+
+    def __len__(self) -> int:
+        return 5
+
+    def __getitem__(self, index: int) -> Frame:
+        raise SourceError(f"image {index}: there is no picture")
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[index] for index in range(len(self)))
+
+    def sightings(self, object_id: str) -> Sequence[Sighting]:
+        raise NotImplementedError
+
+
+class Still(Pictures):
+    """One that tells its camera all the same."""
+
+    def camera(self, index: int) -> Intrinsics:  # noqa: ARG002
+        return CAMERA
 
 
 class Table:
@@ -37,11 +68,11 @@ class Table:
     scene_ids = (1,)
     object_ids = ("cup", "tin")
 
-    def scene(self, scene_id: int) -> PosedSource:
-        raise NotImplementedError
+    def scene(self, scene_id: int) -> PosedSource:  # noqa: ARG002
+        return Still()
 
-    def image_ids(self, scene_id: int) -> Sequence[int]:
-        raise NotImplementedError
+    def image_ids(self, scene_id: int) -> Sequence[int]:  # noqa: ARG002
+        return range(5)
 
     def targets(self, scene_id: int) -> list[Target]:
         require("scene", scene_id, self.scene_ids, self.name)
@@ -54,11 +85,22 @@ class Table:
         return NUMBERS[object_id]
 
     def object_with(self, number: int) -> str:
-        raise NotImplementedError
+        return {1: "cup", 2: "tin"}.get(number, f"object {number}")
+
+
+class Pairs(Table):
+    """The same, each object two points 40 mm apart that half a turn about z exchanges."""
+
+    def __init__(self, declared: bool = True) -> None:
+        self._declared = declared
+
+    def model(self, object_id: str) -> ObjectModel:
+        points_m = np.array([[-0.02, 0, 0], [0.02, 0, 0]])
+        return ObjectModel(points_m, 0.1, object_id == "tin" if self._declared else None)
 
 
 def at(x_mm: float) -> Pose:
-    return Pose(np.eye(3), np.array([x_mm / 1000, 0, 0]))
+    return Pose(np.eye(3), np.array([x_mm / 1000, 0, 1]))
 
 
 def estimate(name: str, image_id: int, error_mm: float, confidence: float = 1.0) -> Estimate:
@@ -107,6 +149,8 @@ def test_a_missing_pose_is_an_infinite_error_and_counts() -> None:
     row = scores.instances[4]
     assert row.missing
     assert (row.add_m, row.adds_m, row.rotation_deg, row.translation_m) == (np.inf,) * 4
+    assert (row.mssd_m, row.mspd_px, row.symmetric_rotation_deg, row.iou) == (np.inf, np.inf, np.inf, 0)
+    assert cup["ar_mspd"] == pytest.approx((1 + 1 + 0.9) / 5)  # 2, 4 and 6 pixels: half of the millimetres
 
 
 def test_no_estimate_at_all_scores_zero() -> None:
@@ -186,9 +230,82 @@ def test_the_protocol_has_what_scoring_decides_and_what_the_run_stated() -> None
     assert (protocol["masks"], protocol["backend"]) == ("visib", "attributes")
     assert (protocol["initialisation"], protocol["reinitialisation"], protocol["poses"]) == ("not stated",) * 3
     assert protocol["missing_pose"] == "infinite error"
-    assert protocol["symmetric_objects"] == ["tin"]
+    assert (protocol["symmetric_objects"], protocol["symmetric_objects_are"]) == (["tin"], "the dataset's")
+    assert (protocol["mspd"], protocol["vsd"]) == ("measured", "not measured: it was not asked for")
     assert "VOCap" in str(protocol["integration"])
     assert {"averaging", "frames", "reference_frames", "model_frame", "dataset", "scenes"} <= set(protocol)
+
+
+def test_average_recalls_and_recalls_of_poses() -> None:
+    scores = score(Table(), [*CUPS, estimate("tin", 0, 12), estimate("tin", 1, 34)])
+    cup, tin = scores.per_object["cup"], scores.per_object["tin"]
+    # 4, 8, 12, 60, 130 of 100 mm: under 10, 9, 8, 0, 0 thresholds of ten; 12 and 34 of 200 mm: 9 and 7
+    assert cup["ar_mssd"] == pytest.approx(2.7 / 5)
+    assert tin["ar_mssd"] == pytest.approx(1.6 / 2)
+    assert scores.pooled["ar_mssd"] == pytest.approx(4.3 / 7)
+    # 2, 4, 6, 30 and 65 pixels of 5, 10 .. 50
+    assert cup["ar_mspd"] == pytest.approx((1 + 1 + 0.9 + 0.4) / 5)
+    assert rounded(cup, "recall_5deg_2cm", "recall_10deg_5cm") == [60, 60]
+    assert rounded(cup, "iou_mean", "iou_recall_50") == [0, 0]  # a point has no volume
+
+
+def test_add_or_adds_is_adds_of_the_symmetric_objects_whoever_names_them(caplog: pytest.LogCaptureFixture) -> None:
+    dataset = Pairs()
+    turned = [Estimate(1, i, 1, 1.0, Pose(np.diag([-1.0, -1, 1]), np.array([0.0, 0, 1]))) for i in IMAGES["cup"]]
+    turned += [Estimate(1, i, 2, 1.0, e.T_cam_obj) for i, e in enumerate(turned[:2])]
+    scores = score(dataset, turned)  # both points change places: ADD is 40 mm and ADD-S nothing
+    assert rounded(scores.per_object["cup"], "add_or_adds_auc_exact", "add_or_adds_recall_0.1d") == [60, 0]
+    assert rounded(scores.per_object["tin"], "add_or_adds_auc_exact", "add_or_adds_recall_0.1d") == [100, 100]
+    assert [row.symmetric for row in scores.instances] == [False] * 5 + [True] * 2
+    told = score(dataset, turned, symmetric=["cup", "lid"])
+    assert rounded(told.per_object["cup"], "add_or_adds_auc_exact") == [100]
+    assert rounded(told.per_object["tin"], "add_or_adds_auc_exact") == [60]
+    assert (told.protocol["symmetric_objects"], told.protocol["symmetric_objects_are"]) == (["cup"], "the user's list")
+    assert "lid" in caplog.text
+    assert rounded(told.pooled, "add_auc_exact") == rounded(scores.pooled, "add_auc_exact")
+
+
+def test_where_nobody_names_symmetric_objects_there_is_no_add_or_adds() -> None:
+    scores = score(Pairs(declared=False), CUPS + TINS)
+    assert not [name for name in scores.pooled if name.startswith("add_or_adds")]
+    assert scores.protocol["symmetric_objects"] == "not declared"
+    assert "add_or_adds_auc" in score(Pairs(declared=False), CUPS, symmetric=[]).pooled
+
+
+def test_without_a_mesh_there_is_no_vsd_and_it_is_said() -> None:
+    scores = score(Table(), CUPS + TINS, with_vsd=True)
+    assert not {"ar", "ar_vsd"} & (set(scores.pooled) | set(scores.mean_of_objects) | set(scores.per_object["cup"]))
+    assert scores.protocol["vsd"] == "not measured: no mesh, only points, of cup, tin"
+
+
+def test_without_a_camera_there_is_no_mspd_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_camera(self: Still, index: int) -> Intrinsics:  # noqa: ARG001
+        raise SourceError(f"image {index}: nothing is known of its camera")
+
+    monkeypatch.setattr(Still, "camera", no_camera)
+    scores = score(Table(), CUPS[:3] + TINS)
+    assert "ar_mspd" not in scores.pooled
+    assert "ar_mssd" in scores.pooled
+    assert scores.protocol["mspd"] == "not measured: image 0: nothing is known of its camera"
+
+
+def test_the_camera_of_a_source_that_does_not_tell_it_is_its_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Table, "scene", lambda *_: Pictures())
+    assert score(Table(), CUPS).protocol["mspd"] == "not measured: image 0: there is no picture"
+
+
+def test_the_truth_of_a_rendered_scene_scores_one_in_every_part(tmp_path: Path) -> None:
+    dataset = open_dataset("synthetic:tabletop?frames=2&size=160x120&noise=0")
+    perfect = [Estimate(1, t.image_id, dataset.number(t.object_id), 1.0, t.T_cam_obj) for t in dataset.targets(1)]
+    write_results(tmp_path / "a.csv", perfect)
+    scores = score_results_file(dataset, tmp_path / "a.csv", with_vsd=True)
+    for values in (scores.pooled, scores.mean_of_objects, *scores.per_object.values()):
+        assert [values[name] for name in ("ar", "ar_vsd", "ar_mssd", "ar_mspd")] == [1, 1, 1, 1]
+        assert rounded(values, "recall_5deg_2cm", "iou_mean", "iou_recall_75", "add_or_adds_auc") == [100] * 4
+    assert scores.protocol["vsd"] == "BOP19, delta 15 mm, distance images"
+    some = score(dataset, perfect[1:], with_vsd=True)
+    assert some.pooled["ar_vsd"] == pytest.approx(1 - 1 / len(perfect))
+    assert some.instances[0].vsd == (np.inf,) * 10
 
 
 def test_a_result_file_scores_like_its_estimates(tmp_path: Path) -> None:
@@ -198,6 +315,34 @@ def test_a_result_file_scores_like_its_estimates(tmp_path: Path) -> None:
     assert scores.protocol["results"] == str(tmp_path / "a.csv")
     with pytest.raises(OutputError, match=r"b\.csv: cannot be read"):
         score_results_file(Table(), tmp_path / "b.csv")
+
+
+@pytest.mark.parametrize(
+    ("ids", "complaint"),
+    [
+        ("3,0,1", r"memory:table has no scene 3; it has 1"),
+        ("1,9,1", r"scene 1 has no image 9; it has 5, 0 to 4"),
+        ("1,0,7", r"no object 'object 7'; it has cup, tin"),
+    ],
+)
+def test_what_a_result_file_speaks_of_has_to_be_there(tmp_path: Path, ids: str, complaint: str) -> None:
+    write_results(tmp_path / "a.csv", CUPS + TINS)
+    with (tmp_path / "a.csv").open("a") as file:
+        file.write(f"{ids},1.0,1 0 0 0 1 0 0 0 1,0 0 1000,-1\n")
+    with pytest.raises(OutputError, match=rf"a\.csv, line 9: .*{complaint}"):
+        score_results_file(Table(), tmp_path / "a.csv")
+
+
+def test_a_scene_without_targets_is_an_error_and_an_object_without_one_is_not(tmp_path: Path) -> None:
+    write_results(tmp_path / "a.csv", [estimate("tin", 4, 10)])
+    assert score_results_file(Table(), tmp_path / "a.csv").protocol["estimates_of_no_target"] == 1
+
+    class Empty(Table):
+        def targets(self, scene_id: int) -> list[Target]:  # noqa: ARG002
+            return []
+
+    with pytest.raises(OutputError, match=r"a\.csv, line 2: memory:table: scene 1 has no target \(all\)"):
+        score_results_file(Empty(), tmp_path / "a.csv")
 
 
 @pytest.mark.shared_data

@@ -156,10 +156,10 @@ def test_agrees_with_the_bop_toolkit(shared_data: Path) -> None:
         motions = ObjectSymmetries.from_models_info(shape["models_info"]).motions()
         assert len(motions) == shape["symmetry_count"]
         points_m, cases = np.array(shape["vertices_mm"]) / 1000, shape["cases"]
-        poses = [_golden_poses(cases, which) for which in ("est", "gt")]
-        surface_mm = 1000 * mssd(points_m, motions, *poses)
+        estimated, truth = (_golden_poses(cases, which) for which in ("est", "gt"))
+        surface_mm = 1000 * mssd(points_m, motions, estimated, truth)
         assert surface_mm.tolist() == pytest.approx([case["mssd"] for case in cases], abs=1e-6)
-        projection_px = mspd(points_m, motions, *poses, [camera] * len(cases))
+        projection_px = mspd(points_m, motions, estimated, truth, [camera] * len(cases))
         assert projection_px.tolist() == pytest.approx([case["mspd"] for case in cases], abs=1e-6)
 
 

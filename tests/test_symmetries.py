@@ -41,7 +41,9 @@ def test_turns_about_an_axis_leave_its_points_and_come_after_the_discrete_ones()
 
 
 def test_motions_are_rigid_and_the_first_is_none() -> None:
-    motions = ObjectSymmetries.from_models_info({"symmetries_continuous": [ROUND], "symmetries_discrete": [OVER]}).motions()
+    motions = ObjectSymmetries.from_models_info(
+        {"symmetries_continuous": [ROUND], "symmetries_discrete": [OVER]}
+    ).motions()
     assert np.allclose(motions.turns @ motions.turns.transpose(0, 2, 1), np.eye(3))
     assert np.allclose(np.linalg.det(motions.turns), 1)
     assert (motions.turns[0] == np.eye(3)).all()
