@@ -23,15 +23,18 @@ SYMMETRIES = {
 
 
 def model(number: int, vertices: int) -> ObjectModel:
-    """A can, a box or a lump, as the symmetries of the object with that number need it; about a third of its vertices
-    are corners of the convex hull of a can, a few of that of a box."""
+    """A can, a box or a lump, as the symmetries of the object with that number need it, its vertices spread over its
+    surface; nearly all of a can's side are corners of its convex hull, few of a box's are."""
     rng = np.random.default_rng([number, 3])
     symmetries = SYMMETRIES.get(number, ASYMMETRIC)
     half_m = rng.uniform(0.02, 0.1, 3)
     if len(symmetries.axes):
-        angles, heights = rng.uniform(0, 2 * np.pi, vertices), rng.uniform(-1, 1, vertices)
-        around = np.stack((np.cos(angles), np.sin(angles)), axis=1) * half_m[0]
-        points_m = np.column_stack((around, np.round(3 * heights) / 3 * half_m[2]))
+        angles, heights = rng.uniform(0, 2 * np.pi, vertices), rng.uniform(-1.3, 1.3, vertices)
+        lid = np.abs(heights) > 1
+        radii_m = half_m[0] * np.where(lid, np.sqrt(rng.random(vertices)), 1)
+        points_m = np.column_stack(
+            (radii_m * np.cos(angles), radii_m * np.sin(angles), half_m[2] * heights.clip(-1, 1))
+        )
     elif symmetries.trivial:
         directions = rng.normal(size=(vertices, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
