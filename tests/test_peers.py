@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from eval.peers import METHODS, Method, method_kind, open_method
+from eval.peers.colored_icp import ColoredIcp, ColoredIcpConfig
 from eval.peers.icp import IcpConfig, LastPoseIcp
-from eval.peers.surfaces import SeenSurface, see_surface
+from eval.peers.surfaces import Fit, SeenSurface, see_surface
 from reference.onboard import onboard, read_reference_frames
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
@@ -20,6 +21,7 @@ from tracker.geometry import Pose
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources.synthetic import SyntheticScene, open_scene
+from tracker.stopwatch import Stopwatch
 
 BOX = "tea_box"
 PEERS = [name for name in METHODS if name != "ours"]
@@ -171,6 +173,18 @@ def test_icp_reaches_an_object_that_is_most_of_its_size_away(box: Shown) -> None
     assert fit is not None
     assert fit.fitness > 0.9
     assert fit.T_cam_obj.distance_to_m(T_true) < 0.003
+
+
+def test_where_colored_icp_loses_every_pair_the_pose_before_it_stands(box: Shown) -> None:
+    seen = see_surface(box.frames[0], box.model, CONFIG)
+    assert isinstance(seen, SeenSurface)
+    T_true = box.truth(box.frames[0])
+    without_reach = ColoredIcp(box.model, ColoredIcpConfig(reaches=(1e-12,) * 3))
+    fit = without_reach(seen, T_true, Stopwatch())
+    assert isinstance(fit, Fit)
+    approach = LastPoseIcp(box.model, IcpConfig()).best(T_true, seen)
+    assert approach is not None
+    assert np.array_equal(fit.T_cam_obj.matrix, approach.T_cam_obj.matrix)
 
 
 @pytest.mark.parametrize("name", PEERS)

@@ -61,14 +61,15 @@ class ColoredIcp:
             return "poor fit: too few of the seen points are near the model"
         with clock("colored icp"):
             T_cam_obj = self._aligned(near.T_cam_obj, seen)
-            fit = Fit(T_cam_obj, self._surface.fitness(T_cam_obj, seen))
-        if fit.fitness < near.fitness - self._config.fitness_lost:
+            fit = None if T_cam_obj is None else Fit(T_cam_obj, self._surface.fitness(T_cam_obj, seen))
+        if fit is None or fit.fitness < near.fitness - self._config.fitness_lost:
             fit = near
         if fit.fitness < self._config.least_fitness:
             return f"poor fit: {fit.fitness:.2f} of the seen points lie on the model"
         return fit
 
-    def _aligned(self, T_cam_obj: Pose, seen: SeenSurface) -> Pose:
+    def _aligned(self, T_cam_obj: Pose, seen: SeenSurface) -> Pose | None:
+        """None where it went so far that no pair is within reach any more."""
         model, config, diameter_m = self._model, self._config, self._model.diameter_m
         facing = ((model.normals @ T_cam_obj.rotation.T) * (T_cam_obj @ model.points)).sum(axis=1) < 0
         source = open3d_cloud(seen.points / diameter_m, seen.normals, seen.colours)
@@ -77,11 +78,16 @@ class ColoredIcp:
         moving[:3, 3] /= diameter_m
         for voxel, reach in zip(config.voxels, config.reaches, strict=True):
             coarse_source, coarse_target = (cloud.voxel_down_sample(voxel) for cloud in (source, target))
-            found = registration.registration_colored_icp(
-                coarse_source, coarse_target, reach, moving,
-                registration.TransformationEstimationForColoredICP(config.geometric),
-                registration.ICPConvergenceCriteria(1e-6, 1e-6, config.steps),
-            )  # fmt: skip
+            try:
+                found = registration.registration_colored_icp(
+                    coarse_source, coarse_target, reach, moving,
+                    registration.TransformationEstimationForColoredICP(config.geometric),
+                    registration.ICPConvergenceCriteria(1e-6, 1e-6, config.steps),
+                )  # fmt: skip
+            except RuntimeError as error:
+                if "No correspondences" not in str(error):
+                    raise
+                return None
             moving = found.transformation.copy()
         moving[:3, 3] *= diameter_m
         return Pose.from_matrix(moving).inverse()
