@@ -31,7 +31,7 @@ CONFIG = TrackerConfig()
 
 @dataclass(frozen=True)
 class Shown:
-    """An object that turns and travels before the camera, a model of two frames, and four other frames."""
+    """An object that turns and travels before the camera, a model of five frames, and four other frames."""
 
     object_id: str
     scene: SyntheticScene
@@ -44,7 +44,7 @@ class Shown:
 
 def show(object_id: str, backend: SaliencyBackend) -> Shown:
     scene = open_scene(f"turn?size=320x240&object={object_id}")
-    model = onboard(read_reference_frames(scene, object_id, 2), backend)
+    model = onboard(read_reference_frames(scene, object_id, 5), backend)
     return Shown(object_id, scene, model, [scene[index] for index in range(40, 44)])
 
 
