@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -47,7 +47,7 @@ class InstanceError:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Instances:
-    """errors: a row a target, by the object's number, then by scene and image.
+    """errors: a row a target, by the object's number, then by scene and image, or in the order that was asked for.
 
     symmetric: those of the objects that count as symmetric for ADD(-S); None where nobody declares anything.
     excluded: targets left out on demand. ignored: estimates where there is no target. surplus: estimates beside one
@@ -91,10 +91,23 @@ def measure(
     for scene_id, t in sorted(found, key=lambda pair: numbers[pair[1].object_id]):
         if (scene_id, t.object_id, t.image_id) not in left_out:
             kept.setdefault(t.object_id, []).append((scene_id, t))
-    models = {object_id: dataset.model(object_id) for object_id in kept}
-    declared = _symmetric(models, symmetric)
     questions = [(scene_id, t) for targets in kept.values() for scene_id, t in targets]
     answers = [best.get((scene_id, t.image_id, numbers[t.object_id])) for scene_id, t in questions]
+    measured = measure_answers(dataset, questions, answers, symmetric, with_vsd)
+    return replace(measured, excluded=len(found) - len(questions), ignored=ignored, surplus=surplus)
+
+
+def measure_answers(
+    dataset: Dataset,
+    questions: Sequence[tuple[int, Target]],
+    answers: Sequence[Estimate | None],
+    symmetric: Collection[str] | None = None,
+    with_vsd: bool = False,
+) -> Instances:
+    """The errors of one answer a question, in the order of the questions (scene, target), of which any may be there
+    several times; None is a missing pose. The rest is as in `measure`."""
+    models = {object_id: dataset.model(object_id) for object_id in dict.fromkeys(t.object_id for _, t in questions)}
+    declared = _symmetric(models, symmetric)
     cameras = Cameras(dataset)
     no_cameras = why_no_cameras(cameras, [(scene_id, t.index) for scene_id, t in questions])
     errors = _errors(models, questions, answers, cameras if no_cameras is None else None)
@@ -115,9 +128,9 @@ def measure(
     return Instances(
         errors=tuple(rows),
         symmetric=declared,
-        excluded=len(found) - len(rows),
-        ignored=ignored,
-        surplus=surplus,
+        excluded=0,
+        ignored=0,
+        surplus=0,
         no_cameras=no_cameras,
         without_mesh=tuple(object_id for object_id, model in models.items() if model.triangles is None),
     )

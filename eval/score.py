@@ -76,19 +76,32 @@ def score(
     Raises SourceError where the dataset does not have what is asked for.
     """
     instances = measure(dataset, estimates, scene_ids, object_ids, exclude, symmetric, with_vsd)
+    told_symmetric = symmetric is not None
+    return summarise(dataset, instances, scene_ids, protocol or {}, tracking or {}, told_symmetric, with_vsd)
+
+
+def summarise(
+    dataset: Dataset,
+    instances: Instances,
+    scene_ids: Sequence[int] | None,
+    protocol: Mapping[str, object],
+    tracking: Mapping[str, TrackingCounts],
+    told_symmetric: bool,
+    with_vsd: bool,
+) -> Scores:
+    """Errors -> scores; the parameters are those of `score`. told_symmetric: whether the user named the objects."""
     rows: dict[str, list[InstanceError]] = {}
     for row in instances.errors:
         rows.setdefault(row.object_id, []).append(row)
-    counts = tracking or {}
     per_object = {
-        object_id: metrics_of(of_object) | tracking_metrics([counts[object_id]] if object_id in counts else [])
+        object_id: metrics_of(of_object) | tracking_metrics([tracking[object_id]] if object_id in tracking else [])
         for object_id, of_object in rows.items()
     }
-    pooled = metrics_of(instances.errors) | tracking_metrics(list(counts.values()))
+    pooled = metrics_of(instances.errors) | tracking_metrics(list(tracking.values()))
     mean = mean_of_objects(list(per_object.values()))
-    stated = dict.fromkeys(STATED_BY_THE_RUN, "not stated") | dict(protocol or {})
+    stated = dict.fromkeys(STATED_BY_THE_RUN, "not stated") | dict(protocol)
     return Scores(
-        protocol=stated | _protocol(dataset, instances, scene_ids, tuple(rows), symmetric is not None, with_vsd),
+        protocol=stated | _protocol(dataset, instances, scene_ids, tuple(rows), told_symmetric, with_vsd),
         pooled=pooled,
         # the mean over those objects alone that have a mesh, say, would pass for that over all
         mean_of_objects={name: value for name, value in mean.items() if name in pooled},
