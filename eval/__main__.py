@@ -156,6 +156,13 @@ class Score:
     """The objects whose ADD(-S) is ADD-S. Default: those that the dataset declares symmetric."""
     vsd: bool = False
     """Measure VSD too, and with it BOP's AR: reads the depth of every image with a target."""
+    align: Literal["none", "reference"] = "none"
+    """reference: the poses are of a tracker without a CAD model, in object frames of its own; each object and scene is
+    aligned with the truth of one frame, which is not scored."""
+    align_frame: Literal["first", "best-score"] = "first"
+    """Which of the estimated targets that frame is."""
+    score_align_frames: bool = False
+    """Score the frames of the alignment too."""
     overwrite: bool = False
     """Replace the file if it exists."""
 
@@ -163,8 +170,11 @@ class Score:
         from eval.datasets import open_dataset
         from eval.report import environment, tables, write_html, write_scores
         from eval.score import score_results_file
+        from tracker.errors import ConfigError
         from tracker.output import require_free
 
+        if self.align == "none" and (self.score_align_frames or self.align_frame != "first"):
+            raise ConfigError("--align-frame and --score-align-frames are of use with --align reference only")
         if self.out:
             for path in (self.out, self.out.with_suffix(".html")):
                 require_free(path, self.overwrite)
@@ -176,6 +186,8 @@ class Score:
             object_ids=self.objects,
             symmetric=self.symmetric,
             with_vsd=self.vsd,
+            align_on=None if self.align == "none" else self.align_frame,
+            keep_alignment_frames=self.score_align_frames,
         )
         if self.out:
             self.out.parent.mkdir(parents=True, exist_ok=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from eval.alignment import ReferenceRule, align
 from eval.auc import AUC_THRESHOLD_M
 from eval.bop_results import Estimate, read_results
 from eval.box_overlap import NOCS_STEPS
@@ -120,16 +121,30 @@ def score_results_file(
     protocol: Mapping[str, object] | None = None,
     symmetric: Collection[str] | None = None,
     with_vsd: bool = False,
+    align_on: ReferenceRule | None = None,
+    keep_alignment_frames: bool = False,
 ) -> Scores:
-    """`score` of a BOP result file. Raises OutputError that names file and line where it cannot be read, and where an
-    estimate is of a scene, an image or an object that the dataset does not have."""
+    """`score` of a BOP result file.
+
+    align_on: the file's poses are in object frames of their own; which frame of each object and scene they are aligned
+    on, see `eval.alignment`. keep_alignment_frames: score those frames too, whose errors are zero.
+    Raises OutputError that names file and line where it cannot be read, and where an estimate is of a scene, an image
+    or an object that the dataset does not have.
+    """
+    estimates: Sequence[Estimate] = read_results(results, known_to(dataset))
+    stated: dict[str, object] = {"results": str(results)}
+    if align_on is not None:
+        aligned = align(dataset, estimates, align_on, scene_ids, object_ids)
+        estimates = aligned.estimates
+        stated |= aligned.stated() | {"alignment_frames_are": "scored" if keep_alignment_frames else "not scored"}
+        exclude = frozenset(exclude) | (frozenset() if keep_alignment_frames else aligned.reference_frames)
     return score(
         dataset,
-        read_results(results, known_to(dataset)),
+        estimates,
         scene_ids=scene_ids,
         object_ids=object_ids,
         exclude=exclude,
-        protocol={"results": str(results)} | dict(protocol or {}),
+        protocol=stated | dict(protocol or {}),
         symmetric=symmetric,
         with_vsd=with_vsd,
     )
