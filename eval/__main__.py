@@ -13,6 +13,7 @@ import tyro
 from eval.bench.registration import RegistrationBench
 from eval.bench.saliency import SaliencyBench
 from eval.bench.scoring import ScoringBench
+from eval.pairs.command import Pairs
 from tracker.terminal import STDERR, progress, run
 
 if TYPE_CHECKING:
@@ -214,7 +215,7 @@ class Bench:
 def main() -> None:
     run(
         tyro.extras.subcommand_cli_from_dict(
-            {"track": Track, "score": Score, "bench": Bench},
+            {"track": Track, "score": Score, "pairs": Pairs, "bench": Bench},
             prog="python -m eval",
             args=sys.argv[1:],
         )
