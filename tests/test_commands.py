@@ -493,3 +493,58 @@ def test_eval_score_refuses_what_it_cannot_read_and_leaves_no_file(
     Path("broken.csv").write_text("scene,image,pose\n")
     assert_refused(run("eval", "score", *options, "--out", "out.json"), *words)
     assert set(content(tmp_path)) == {"broken.csv"}
+
+
+def test_eval_score_aligns_object_frames_and_says_so(evaluated: Path, run: Run, tmp_path: Path) -> None:
+    line = ("eval", "score", "--dataset", SOURCE, "--results", evaluated / "results.csv", "--out")
+    assert run(*line, tmp_path / "a.json", "--align", "reference").code == 0
+    scores = json.loads((tmp_path / "a.json").read_text())
+    assert scores["metrics"]["pooled"]["instances"] == 5
+    assert scores["protocol"]["alignment_frames"] == {f"1/{BOX}": 0}
+    assert run(*line, tmp_path / "b.json", "--align", "reference", "--score-align-frames").code == 0
+    assert json.loads((tmp_path / "b.json").read_text())["metrics"]["pooled"]["instances"] == 6
+    assert_refused(run(*line, tmp_path / "c.json", "--align-frame", "best-score"), "--align reference")
+    assert not (tmp_path / "c.json").exists()
+
+
+def test_eval_pairs_draws_answers_and_scores_and_its_list_does_it_again(run: Run, tmp_path: Path) -> None:
+    first, again = tmp_path / "first", tmp_path / "again"
+    options = ("--kind", "same-scene", "--pairs", 4, "--seed", 7, "--out", first)
+    said = run("eval", "pairs", "--dataset", SOURCE, *options)
+    assert (said.code, said.out) == (0, ""), said.err
+    assert "one reference view" not in said.err  # as every model here has
+    files = set(content(first))
+    assert {"pairs.csv", "poses.jsonl", "scores.json", "report.html", "config.yaml"} < files
+    assert any(name.startswith("results") for name in files)
+    scores = json.loads((first / "scores.json").read_text())
+    protocol = scores["protocol"]
+    assert (protocol["kind"], protocol["seed"], protocol["pairs"], protocol["prior"]) == ("same-scene", 7, 4, "off")
+    assert 1 <= protocol["anchors"] <= 4
+    assert "not stated" not in protocol.values()
+    assert (scores["metrics"]["pooled"]["instances"], scores["metrics"]["pooled"]["missing"]) == (4, 0)
+
+    said = run("eval", "pairs", "--dataset", SOURCE, "--list", first / "pairs.csv", "--out", again)
+    assert said.code == 0, said.err
+    repeated = json.loads((again / "scores.json").read_text())
+    assert repeated["metrics"] == scores["metrics"]
+    assert (repeated["protocol"]["kind"], repeated["protocol"]["seed"]) == ("same-scene", None)
+    assert (again / "pairs.csv").read_text() == (first / "pairs.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ((), ("no cross-scene pair", "same-scene")),
+        (("--kind", "same-scene", "--pairs", "0"), ("--pairs", "got 0")),
+        (("--list", "absent.csv"), ("absent.csv", "cannot be read")),
+        (("--list", "broken.csv"), ("broken.csv, line 1", "SCENE IMAGE")),
+        (("--list", "broken.csv", "--seed", "1"), ("--list", "--seed")),
+    ],
+)
+def test_eval_pairs_refuses_what_it_cannot_do_and_leaves_no_folder(
+    options: tuple[str, ...], words: tuple[str, ...], run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("broken.csv").write_text("scene,image,pose\n")
+    assert_refused(run("eval", "pairs", "--dataset", SOURCE, *options, "--out", "out"), *words)
+    assert set(content(tmp_path)) == {"broken.csv"}

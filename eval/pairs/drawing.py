@@ -36,17 +36,18 @@ def draw_pairs(
     views: dict[str, list[View]] = {}
     for scene_id, target in targets_of(dataset, scene_ids, object_ids):
         views.setdefault(target.object_id, []).append(View(scene_id, target))
-    anchors = [
-        anchor
-        for object_id in sorted(views, key=dataset.number)
-        for anchor in _good_anchors(views[object_id])
-        if any(_may_meet(anchor, query, kind) for query in views[object_id])
-    ]
-    if not anchors:
-        other = "same-scene" if kind == "cross-scene" else "cross-scene"
+    good = [anchor for object_id in sorted(views, key=dataset.number) for anchor in _good_anchors(views[object_id])]
+    anchors = [a for a in good if any(_may_meet(a, query, kind) for query in views[a.target.object_id])]
+    if not good:
         raise SourceError(
-            f"{dataset.name} has no {kind} pair of an anchor and a query among {sum(map(len, views.values()))} targets "
-            f"of {len(views)} objects; try the kind {other}"
+            f"{dataset.name}: none of {sum(map(len, views.values()))} targets shows its object well enough for an "
+            f"anchor, {LEAST_VISIBLE_PX} visible pixels are needed"
+        )
+    if not anchors:
+        other, where = ("same-scene", "scene") if kind == "cross-scene" else ("cross-scene", "image of its scene")
+        raise SourceError(
+            f"{dataset.name} has no {kind} pair: none of {len(good)} possible anchors of {len(views)} objects has a "
+            f"target in another {where}; try the kind {other}"
         )
     rng = np.random.default_rng(seed)
     left = list(range(len(anchors)))
