@@ -1,4 +1,4 @@
-"""`python -m eval track` runs the tracker on a dataset and scores it, `pairs` does so on pairs of images, `score` scores
+"""`python -m eval track` runs the tracker on a dataset and scores it, `pairs` on pairs of images; `score` scores
 anybody's BOP result file."""
 
 from __future__ import annotations
