@@ -60,7 +60,7 @@ class Track:
     config: Path | None = None
     """YAML file with settings that differ from the defaults."""
     out: Path | None = None
-    """Folder for scores.json, results.csv, report.html, config.yaml and what --view makes."""
+    """Folder for scores.json, results.csv, report.html, report.md, config.yaml and what --view makes."""
     view: Literal["none", "overlay"] = "none"
     """overlay: write overlay.mp4 to the --out folder (one for each of several scenes)."""
     overwrite: bool = False
@@ -71,10 +71,13 @@ class Track:
 
         from eval.bop_results import write_results
         from eval.datasets import open_dataset
+        from eval.html_report import write_html
+        from eval.markdown_report import write_markdown
         from eval.peers import method_kind
         from eval.predict import Protocol, track_dataset
-        from eval.report import environment, tables, write_html, write_scores
+        from eval.report import environment, make_report, write_scores
         from eval.score import score
+        from eval.score_tables import tables
         from reference.vocabulary import read_vocabulary
         from tracker.config import dump_config, read_config
         from tracker.errors import ConfigError
@@ -129,7 +132,10 @@ class Track:
                 extra = {"latency_ms": latency_ms, "environment": environment()}
                 write_results(folder / "results.csv", tracked.estimates)
                 write_scores(folder / "scores.json", scores, extra)
-                write_html(folder / "report.html", scores, extra, f"Tracking {self.dataset}")
+                title = f"Tracking {self.dataset}"
+                report = make_report(title, dataset, scores, tracked.estimates, extra, tracked.records)
+                write_html(folder / "report.html", report)
+                write_markdown(folder / "report.md", report)
                 (folder / "config.yaml").write_text(dump_config(config))
         who = f"backend {self.backend}" if kind.concepts else f"method {self.method}"
         for each in tables(scores, f"{self.dataset}, {self.views} views, {who}"):
@@ -149,7 +155,7 @@ class Score:
     results: Path
     """The csv: scene_id,im_id,obj_id,score,R,t,time."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File for the scores, for example scores.json; a page of the same name is written beside it."""
+    """File for the scores, for example scores.json; a page and a Markdown file of that name are written beside it."""
     scenes: tuple[int, ...] | None = None
     """Only these scenes."""
     objects: tuple[str, ...] | None = None
@@ -169,16 +175,20 @@ class Score:
     """Replace the file if it exists."""
 
     def __call__(self) -> None:
+        from eval.bop_results import read_results
         from eval.datasets import open_dataset
-        from eval.report import environment, tables, write_html, write_scores
+        from eval.html_report import write_html
+        from eval.markdown_report import write_markdown
+        from eval.report import environment, make_report, write_scores
         from eval.score import score_results_file
+        from eval.score_tables import tables
         from tracker.errors import ConfigError
         from tracker.output import require_free
 
         if self.align == "none" and (self.score_align_frames or self.align_frame != "first"):
             raise ConfigError("--align-frame and --score-align-frames are of use with --align reference only")
         if self.out:
-            for path in (self.out, self.out.with_suffix(".html")):
+            for path in (self.out, self.out.with_suffix(".html"), self.out.with_suffix(".md")):
                 require_free(path, self.overwrite)
         dataset = open_dataset(self.dataset)
         scores = score_results_file(
@@ -193,8 +203,11 @@ class Score:
         )
         if self.out:
             self.out.parent.mkdir(parents=True, exist_ok=True)
-            write_html(self.out.with_suffix(".html"), scores, {"environment": environment()}, f"{self.results}")
-            write_scores(self.out, scores, {"environment": environment()})
+            extra = {"environment": environment()}
+            report = make_report(f"{self.results}", dataset, scores, read_results(self.results), extra)
+            write_html(self.out.with_suffix(".html"), report)
+            write_markdown(self.out.with_suffix(".md"), report)
+            write_scores(self.out, scores, extra)
         for each in tables(scores, f"{self.results} on {self.dataset}"):
             STDERR.print(each)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from eval.bop_results import Estimate
 from eval.datasets import Dataset
+from eval.frame_record import FrameRecord
 from eval.instances import ObjectInImage
 from eval.peers import method_kind, open_method
 from eval.score import TrackingCounts
@@ -63,13 +64,14 @@ class Protocol:
 class Tracked:
     """estimates: one for every frame and object with a pose. reference_frames: those that models were made of.
     counts: by object. timings_ms: of every step, stage -> milliseconds. refused: "scene/object" -> why no model could
-    be made of it; its poses are missing."""
+    be made of it; its poses are missing. records: of every step, in the order of the timings."""
 
     estimates: list[Estimate] = field(default_factory=list)
     reference_frames: set[ObjectInImage] = field(default_factory=set)
     counts: dict[str, TrackingCounts] = field(default_factory=dict)
     timings_ms: list[dict[str, float]] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
+    records: list[FrameRecord] = field(default_factory=list)
 
     def latency_ms(self) -> dict[str, object]:
         """Median and 95th percentile of an object's whole step, and the median of every stage where it ran."""
@@ -163,6 +165,7 @@ def _record(
     time_s = sum(result.timings_ms["total"] for result in results) / 1000  # of the whole image, as BOP has it
     for result, visible in zip(results, seen, strict=True):
         tracked.timings_ms.append(result.timings_ms)
+        tracked.records.append(FrameRecord.of(scene_id, image_id, result))
         before = tracked.counts.get(result.object_id, TrackingCounts(0, 0, 0))
         tracked.counts[result.object_id] = TrackingCounts(
             frames=before.frames + 1,

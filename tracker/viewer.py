@@ -13,7 +13,7 @@ import numpy.typing as npt
 from tracker.concept import ConceptModel
 from tracker.errors import OutputError
 from tracker.frame import Frame
-from tracker.geometry import Floats, Pose
+from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.result import TrackResult, TrackState
 
 Picture = npt.NDArray[np.uint8]
@@ -82,37 +82,40 @@ def draw_overlay(
     """(H, W, 3) uint8 RGB, the frame with boxes, axes and a line of text an object."""
     picture = np.ascontiguousarray(frame.rgb.copy())
     for object_id, T_cam_obj in truth.items():
-        _draw_box(picture, frame, T_cam_obj, boxes[object_id], TRUTH, 1)
+        draw_box(picture, frame.intrinsics, T_cam_obj, boxes[object_id], TRUTH, 1)
     strip = picture[: _line_height(picture) * len(results) + 8]
     strip[:] = strip // 2  # text needs a ground
     for row, result in enumerate(results):
         corners = boxes[result.object_id]
         if result.pose is not None:
-            _draw_box(picture, frame, result.pose, corners, ESTIMATE, 2)
-            _draw_axes(picture, frame, result.pose, 0.3 * float(np.ptp(corners, axis=0).max()))
+            draw_box(picture, frame.intrinsics, result.pose, corners, ESTIMATE, 2)
+            _draw_axes(picture, frame.intrinsics, result.pose, 0.3 * float(np.ptp(corners, axis=0).max()))
         _write_line(picture, row, result)
     return picture
 
 
-def _draw_box(
-    picture: Picture, frame: Frame, T_cam_obj: Pose, corners: Floats, colour: tuple[int, int, int], width: int
+def draw_box(
+    picture: Picture, camera: Intrinsics, T_cam_obj: Pose, corners: Floats, colour: tuple[int, int, int], width: int
 ) -> None:
+    """The twelve edges of a box into an RGB picture of the camera. corners: (8, 3) as `box_corners` orders them."""
     points_cam = T_cam_obj @ corners
     for i, j in EDGES:
-        _draw_line(picture, frame, points_cam[[i, j]], colour, width)
+        _draw_line(picture, camera, points_cam[[i, j]], colour, width)
 
 
-def _draw_axes(picture: Picture, frame: Frame, T_cam_obj: Pose, length_m: float) -> None:
+def _draw_axes(picture: Picture, camera: Intrinsics, T_cam_obj: Pose, length_m: float) -> None:
     ends = T_cam_obj @ np.vstack((np.zeros(3), length_m * np.eye(3)))
     for axis, colour in enumerate(AXES):
-        _draw_line(picture, frame, ends[[0, axis + 1]], colour, 2)
+        _draw_line(picture, camera, ends[[0, axis + 1]], colour, 2)
 
 
-def _draw_line(picture: Picture, frame: Frame, ends_cam: Floats, colour: tuple[int, int, int], width: int) -> None:
+def _draw_line(
+    picture: Picture, camera: Intrinsics, ends_cam: Floats, colour: tuple[int, int, int], width: int
+) -> None:
     if (ends_cam[:, 2] < 0.01).any():  # behind the camera there is nothing to draw
         return
     # four more bits of position than pixels, so that lines do not jitter
-    (x0, y0), (x1, y1) = np.clip(frame.intrinsics.project(ends_cam), -1e4, 1e4).round(2) * 16
+    (x0, y0), (x1, y1) = np.clip(camera.project(ends_cam), -1e4, 1e4).round(2) * 16
     cv2.line(picture, (int(x0), int(y0)), (int(x1), int(y1)), colour, width, cv2.LINE_AA, 4)
 
 

@@ -1,0 +1,157 @@
+"""The report as one page that stands alone: no file beside it, nothing fetched, readable on a phone."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+from eval.page import page
+from eval.plots.error_curve import error_curves
+from eval.plots.error_over_time import error_over_time
+from eval.plots.object_bars import object_bars
+from eval.plots.reliability_diagram import reliability_diagram
+from eval.plots.stage_timings import stage_timings
+from eval.report import Report
+from eval.report_text import (
+    MOST_GROUPS,
+    TextTable,
+    latency,
+    missing_table,
+    plain,
+    published_conventions,
+    published_table,
+    worst_caption,
+)
+from eval.score_tables import TABLES, headings, object_rows, total_rows
+from eval.worst_pictures import WorstFrame
+
+WORDS = {"data", "reason", "images"}  # columns that may wrap
+
+
+def write_html(path: Path, report: Report) -> None:
+    """All sections that the run has data for; of the others a line says why they are not there."""
+    sections = (_scores, _anchors, _sizes, _times, _confidence, _stages, _worst, _missing, _conventions)
+    body = "\n".join((f"<h1>{escape(report.title)}</h1>", *(section(report) for section in sections)))
+    path.write_text(page(report.title, body), encoding="utf-8")
+
+
+def _scores(report: Report) -> str:
+    parts = []
+    for heading, columns, legend in TABLES:
+        rows, totals = object_rows(report.scores, columns), total_rows(report.scores, columns)
+        parts.append(f"<h2>{escape(heading)}</h2>" if heading else "")
+        parts.append(_table(headings(columns), rows, totals) + f'<p class="legend">{escape(legend)}</p>')
+    return "\n".join(parts)
+
+
+def _anchors(report: Report) -> str:
+    if not report.anchors:
+        return _absent("comparison with published numbers", "the report was not told what data it is of")
+    said = "Areas up to 10 cm on YCB-V, in percent; this run's are VOCap, pooled over instances."
+    table = published_table(report)
+    return f"<h2>Beside published numbers</h2>{_text_table(table)}<p>{said}</p>{_definitions(published_conventions())}"
+
+
+def _sizes(report: Report) -> str:
+    if not report.scores.instances:
+        return _absent("error curve", "there is not one instance to score")
+    curves = error_curves(report.scores.instances, report.scores.pooled)
+    return f"<h2>How large are the errors?</h2>{_grid(curves, object_bars(report.scores))}"
+
+
+def _times(report: Report) -> str:
+    if not report.scores.instances:
+        return _absent("plot of errors over time", "there is not one instance to score")
+    about = "Missing poses and errors over 10 cm are on the upper edge."
+    if not report.records:
+        about += " No states and no confidence: the poses came from a file, which does not tell them."
+    drawn = error_over_time(report.scores.instances, report.records)
+    return f"<h2>When do they happen?</h2><p>{about}</p>{_grid(drawn)}"
+
+
+def _confidence(report: Report) -> str:
+    if report.reliability is None:
+        return _absent("reliability diagram", "no pose that is scored came with a tracker's confidence")
+    return f"<h2>Is the confidence to be trusted?</h2>{_grid(reliability_diagram(report.reliability))}"
+
+
+def _stages(report: Report) -> str:
+    told = latency(report)
+    if told is None:
+        return _absent("stage timings", "nothing was timed")
+    return f"<h2>Where does the time go?</h2>{_grid(stage_timings(*told))}"
+
+
+def _worst(report: Report) -> str:
+    if not report.worst:
+        return _absent("worst frames", "there is not one pose to draw")
+    about = "The largest ADD(-S), the worst first: the true pose green, the estimate red."
+    return f"<h2>Worst frames</h2><p>{about}</p>{_grid(*map(_overlay, report.worst))}"
+
+
+def _overlay(worst: WorstFrame) -> str:
+    which, how = worst_caption(worst)
+    if worst.jpeg is None:
+        shown = f'<p class="absent">No picture: {escape(worst.why_not)}</p>'
+    else:
+        data = b64encode(worst.jpeg).decode("ascii")
+        shown = f'<img alt="{escape(which)}" src="data:image/jpeg;base64,{data}" width="320" height="240">'
+    return f"<figure>{shown}<figcaption>{escape(which)}</figcaption><p>{escape(how)}</p></figure>"
+
+
+def _missing(report: Report) -> str:
+    if not report.missing:
+        return _absent("list of missing poses", "every instance has a pose")
+    more = len(report.missing) - MOST_GROUPS
+    rest = f'<p class="absent">And {more} more groups.</p>' if more > 0 else ""
+    return f"<h2>Missing poses</h2>{_text_table(missing_table(report))}{rest}"
+
+
+def _conventions(report: Report) -> str:
+    parts = ["<h2>Protocol</h2>", _definitions(report.scores.protocol)]
+    for name, value in report.extra.items():
+        if isinstance(value, Mapping):
+            parts.append(f"<h2>{escape(name.replace('_', ' ').capitalize())}</h2>{_definitions(value)}")
+    return "\n".join(parts)
+
+
+def _text_table(table: TextTable) -> str:
+    return _table(table.heading, table.rows, ())
+
+
+def _table(heading: Sequence[str], rows: Iterable[Sequence[str]], totals: Iterable[Sequence[str]]) -> str:
+    wraps = [name in WORDS for name in heading]
+
+    def drawn(rows: Iterable[Sequence[str]]) -> str:
+        cells = ([_cell(name, words) for name, words in zip(row, wraps, strict=True)] for row in rows)
+        return "".join(f"<tr>{''.join(row)}</tr>" for row in cells)
+
+    buttons = "".join(
+        f'<th scope="col" aria-sort="none"{" class=words" if words else ""}>'
+        f'<button type="button">{escape(name)}</button></th>'
+        for name, words in zip(heading, wraps, strict=True)
+    )
+    foot = f"<tfoot>{total}</tfoot>" if (total := drawn(totals)) else ""
+    return (
+        f'<div class="wide"><table class="sortable"><thead><tr>{buttons}</tr></thead>'
+        f"<tbody>{drawn(rows)}</tbody>{foot}</table></div>"
+    )
+
+
+def _cell(text: str, words: bool) -> str:
+    return f'<td class="words">{escape(text)}</td>' if words else f"<td>{escape(text)}</td>"
+
+
+def _definitions(values: Mapping[str, object]) -> str:
+    pairs = (f"<dt>{escape(k.replace('_', ' '))}</dt><dd>{escape(plain(v))}</dd>" for k, v in values.items())
+    return f"<dl>{''.join(pairs)}</dl>"
+
+
+def _grid(*figures: str) -> str:
+    return f'<div class="grid">{"".join(figures)}</div>'
+
+
+def _absent(what: str, why: str) -> str:
+    return f'<p class="absent">No {what}: {why}.</p>'
