@@ -17,6 +17,7 @@ from eval.report import Report
 from eval.report_text import (
     MOST_GROUPS,
     TextTable,
+    about_published,
     latency,
     missing_table,
     plain,
@@ -49,7 +50,7 @@ def _scores(report: Report) -> str:
 def _anchors(report: Report) -> str:
     if not report.anchors:
         return _absent("comparison with published numbers", "the report was not told what data it is of")
-    said = "Areas up to 10 cm on YCB-V, in percent; this run's are VOCap, pooled over instances."
+    said = escape(about_published(report))
     table = published_table(report)
     return f"<h2>Beside published numbers</h2>{_text_table(table)}<p>{said}</p>{_definitions(published_conventions())}"
 
@@ -64,7 +65,7 @@ def _sizes(report: Report) -> str:
 def _times(report: Report) -> str:
     if not report.scores.instances:
         return _absent("plot of errors over time", "there is not one instance to score")
-    about = "Missing poses and errors over 10 cm are on the upper edge."
+    about = "Missing poses and errors over 10 cm are on the upper edge, those under 0.5 mm on the lower one."
     if not report.records:
         about += " No states and no confidence: the poses came from a file, which does not tell them."
     drawn = error_over_time(report.scores.instances, report.records)

@@ -10,6 +10,7 @@ from eval.report import Report
 from eval.report_text import (
     MOST_GROUPS,
     TextTable,
+    about_published,
     latency,
     missing_table,
     plain,
@@ -37,6 +38,7 @@ def _parts(report: Report) -> Iterable[str]:
     if report.anchors:
         yield "## Beside published numbers"
         yield _text_table(published_table(report), words=1)
+        yield _safe(about_published(report))
         yield _definitions(published_conventions())
     confidence = reliability_table(report)
     if confidence is not None and report.reliability is not None:

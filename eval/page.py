@@ -9,9 +9,9 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1a1a1a; --faint: #d5d5d5; --paper: #fff; --quiet: #5c5c5c;
-  --add: #d55e00; --adds: #0072b2; --both: #009e73; --tracking: #8fc1e3; --lost: #d55e00; }
+  --add: #d55e00; --adds: #0072b2; --both: #009e73; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e8e8e8; --faint: #444; --paper: #161616; --quiet: #a8a8a8;
-  --add: #f0853a; --adds: #56a8e0; --both: #33bf93; --tracking: #2f5f80; --lost: #f0853a; } }
+  --add: #f0853a; --adds: #56a8e0; --both: #33bf93; } }
 * { box-sizing: border-box; }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 66rem;
   margin: 1.5rem auto; padding: 0 1rem; }
@@ -22,7 +22,8 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .55rem; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--faint);
   vertical-align: top; }
 th:first-child, td:first-child, .words { text-align: left; } tfoot td { font-weight: 600; }
-td.words { white-space: normal; min-width: 9rem; }
+td.words { white-space: normal; min-width: 5.5rem; }
+td:first-child, th:first-child { position: sticky; left: 0; background: var(--paper); }
 th button { all: unset; cursor: pointer; font-weight: 600; } th button:focus-visible { outline: 2px solid var(--adds); }
 th[aria-sort=ascending] button::after { content: " ▲"; } th[aria-sort=descending] button::after { content: " ▼"; }
 dl { display: grid; grid-template-columns: minmax(7rem, 14rem) 1fr; gap: .2rem 1rem; }
@@ -34,7 +35,8 @@ svg text { fill: var(--ink); font: 13px system-ui, sans-serif; }
 .key { display: inline-block; margin-right: 1rem; }
 .key i { display: inline-block; width: .8rem; height: .5rem; margin-right: .35rem; }
 img { width: 100%; height: auto; display: block; background: var(--faint); }
-@media (max-width: 30rem) { dl { grid-template-columns: 1fr; gap: 0; } dd { margin-bottom: .4rem; } }
+@media (max-width: 30rem) { th, td { padding: .2rem .3rem; font-size: .82rem; }
+  dl { grid-template-columns: 1fr; gap: 0; } dd { margin-bottom: .4rem; } }
 """
 
 # A click on a heading sorts the body; totals are in the foot. What is no number comes last in either direction.

@@ -79,10 +79,9 @@ def why_not_ycbv(dataset: Dataset, protocol: Mapping[str, object]) -> str | None
     return None
 
 
-def data_of(published: Published, dataset: Dataset, protocol: Mapping[str, object]) -> str:
-    """Whether a published number is of this run's data, in words."""
-    why_not = why_not_ycbv(dataset, protocol)
+def data_of(published: Published, dataset: Dataset, why_not: str | None) -> str:
+    """Whether a published number is of this run's data, in words. why_not: what `why_not_ycbv` says."""
     if why_not is not None:
-        return f"not the same data: {why_not}"
+        return "not the same data"
     on_keyframes = dataset.name.startswith("ycb-video:")
     return "the same frames" if published.on_keyframes == on_keyframes else "the same recordings, other frames of them"

@@ -13,7 +13,7 @@ from pathlib import Path
 from eval.bop_results import Estimate
 from eval.datasets import Dataset
 from eval.frame_record import FrameRecord
-from eval.published import PUBLISHED, data_of
+from eval.published import PUBLISHED, data_of, why_not_ycbv
 from eval.reliability import Reliability, reliability
 from eval.score import Scores
 from eval.worst_frames import MissingPoses, missing_poses
@@ -28,8 +28,8 @@ class Report:
     """All that the page and its Markdown say, so that both say the same.
 
     extra: what stands beside the protocol, by heading; `latency_ms` and `environment`. records: of every step, none
-    where poses came from a file. anchors: for each of `published.PUBLISHED`, whether it is of the same data.
-    reliability: None where no pose has a confidence.
+    where poses came from a file. anchors: for each of `published.PUBLISHED`, whether it is of the same data, and
+    why_not_ycbv says why it is not. reliability: None where no pose has a confidence.
     """
 
     title: str
@@ -37,6 +37,7 @@ class Report:
     extra: Mapping[str, object]
     records: Sequence[FrameRecord] = ()
     anchors: Sequence[str] = ()
+    why_not_ycbv: str | None = None
     reliability: Reliability | None = None
     worst: Sequence[WorstFrame] = ()
     missing: Sequence[MissingPoses] = ()
@@ -52,12 +53,14 @@ def make_report(
 ) -> Report:
     """Reads the images of the worst frames again, and no others."""
     confidences = {(r.scene_id, r.object_id, r.image_id): r.confidence for r in records}
+    why_not = why_not_ycbv(dataset, scores.protocol)
     return Report(
         title,
         scores,
         extra,
         records,
-        anchors=tuple(data_of(published, dataset, scores.protocol) for published in PUBLISHED),
+        anchors=tuple(data_of(published, dataset, why_not) for published in PUBLISHED),
+        why_not_ycbv=why_not,
         reliability=reliability(scores.instances, confidences),
         worst=worst_frames(dataset, scores.instances, estimates),
         missing=tuple(missing_poses(scores.instances, records)),

@@ -35,6 +35,11 @@ def published_table(report: Report) -> TextTable:
     return TextTable(("method", "ADD-AUC", "ADD-S-AUC", "data"), (ours, *others))
 
 
+def about_published(report: Report) -> str:
+    said = "Areas up to 10 cm on YCB-V, in percent; this run's are VOCap, pooled over instances."
+    return said if report.why_not_ycbv is None else f"{said} Not the same data: {report.why_not_ycbv}."
+
+
 def published_conventions() -> dict[str, str]:
     return {p.method: f"{p.convention}. {p.source}." for p in PUBLISHED}
 

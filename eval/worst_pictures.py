@@ -17,11 +17,11 @@ from eval.worst_frames import worst_instances
 from tracker.errors import FrameError, TrackerError
 from tracker.frame import Frame
 from tracker.geometry import Floats, Intrinsics, Pose
-from tracker.viewer import TRUTH, Picture, box_corners, draw_box
+from tracker.viewer import Picture, box_corners, draw_box
 
 log = logging.getLogger(__name__)
 
-ESTIMATE = (225, 40, 30)  # red, and twice as wide as the truth, so that it is not colour alone that tells them apart
+ESTIMATE, TRUTH = (215, 30, 30), (60, 220, 90)  # RGB, a dark red and a light green: not hue alone tells them apart
 SIZE = (320, 240)  # pixels of a cutout
 LARGEST_BYTES = 25_000
 MARGIN = 1.3  # of the box around both poses
@@ -59,9 +59,8 @@ def worst_frames(
         try:
             frame = dataset.scene(row.scene_id)[target.index]
             corners = box_corners(dataset.model(row.object_id).points_m)
-            found.append(
-                WorstFrame(row, answer.score, jpeg(draw_cutout(frame, answer.T_cam_obj, target.T_cam_obj, corners)))
-            )
+            cutout = draw_cutout(frame, answer.T_cam_obj, target.T_cam_obj, corners)
+            found.append(WorstFrame(row, answer.score, jpeg(cutout)))
         except TrackerError as error:
             log.warning("no picture of scene %d, image %d: %s", row.scene_id, row.image_id, error)
             found.append(WorstFrame(row, answer.score, None, str(error)))
@@ -83,7 +82,7 @@ def draw_cutout(frame: Frame, estimated: Pose, truth: Pose, corners: Floats) -> 
     # drawn after enlarging, so that lines are as sharp in a small object's cutout as in a large one's
     seen = Intrinsics(camera.fx * scale, camera.fy * scale, *centre, width, height)
     draw_box(picture, seen, estimated, corners, ESTIMATE, 2)
-    draw_box(picture, seen, truth, corners, TRUTH, 1)
+    draw_box(picture, seen, truth, corners, TRUTH, 2)
     return picture
 
 

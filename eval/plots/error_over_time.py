@@ -17,11 +17,12 @@ TICKS_MM = (1, 10, 100)
 LEFT, ROW = 82, 16
 # Okabe and Ito, Color Universal Design, 2008, without black and the yellow that white paper swallows
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a6d3b", "#808080")
-STATES = {"tracking": "var(--tracking)", "lost": "var(--lost)", "initialising": "var(--faint)"}
+STATES = {"tracking": "var(--faint)", "lost": "var(--ink)", "initialising": "var(--quiet)"}  # the hues are the objects'
 
 
 def error_over_time(rows: Sequence[InstanceError], records: Sequence[FrameRecord]) -> str:
-    """ADD of every instance over the images; missing poses and errors over 10 cm are on the upper edge.
+    """ADD of every instance over the images; missing poses and errors over 10 cm are on the upper edge, those
+    under 0.5 mm on the lower one.
 
     Under it, where there are records, the confidence and the state of every object.
     """
@@ -61,7 +62,7 @@ def _scene(scene_id: int, errors: Sequence[InstanceError], records: Sequence[Fra
             said = f"{name}: {state} from image {first} on"
             marks.append(rect(left, y + 2, bottom.across(end) - left, ROW - 4, STATES[state], said))
     marks += bottom.grid(ticks, (), "image")
-    key += [(colour, state) for state, colour in STATES.items() if any(r.state == state for r in records)]
+    key += [(colour, f"is {state}") for state, colour in STATES.items() if any(r.state == state for r in records)]
     return figure(f"Scene {scene_id}", marks, bottom.bottom + 40, key)
 
 
