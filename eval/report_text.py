@@ -12,7 +12,7 @@ from eval.score_tables import cells
 from eval.worst_frames import MissingPoses
 from eval.worst_pictures import WorstFrame
 
-AUC_COLUMNS = {"add_auc": ("ADD-AUC", 1), "adds_auc": ("ADD-S-AUC", 1)}
+AUC_COLUMNS = {"add_auc": ("ADD", 1), "adds_auc": ("ADD-S", 1)}
 MOST_GROUPS = 40  # of missing poses; more would be no list but a log
 MOST_IMAGES = 12
 
@@ -32,11 +32,11 @@ def published_table(report: Report) -> TextTable:
         (p.method, f"{p.add_auc:.1f}", f"{p.adds_auc:.1f}", data)
         for p, data in zip(PUBLISHED, report.anchors, strict=True)
     ]
-    return TextTable(("method", "ADD-AUC", "ADD-S-AUC", "data"), (ours, *others))
+    return TextTable(("method", "ADD", "ADD-S", "data"), (ours, *others))
 
 
 def about_published(report: Report) -> str:
-    said = "Areas up to 10 cm on YCB-V, in percent; this run's are VOCap, pooled over instances."
+    said = "AUC up to 10 cm on YCB-V, in percent; this run's are VOCap, pooled over instances."
     return said if report.why_not_ycbv is None else f"{said} Not the same data: {report.why_not_ycbv}."
 
 

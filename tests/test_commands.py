@@ -370,7 +370,7 @@ def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_eval_track_writes_poses_scores_a_page_settings_and_a_video(evaluated: Path) -> None:
-    files = {"results.csv", "scores.json", "report.html", "config.yaml", "overlay.mp4"}
+    files = {"results.csv", "scores.json", "report.html", "report.md", "config.yaml", "overlay.mp4"}
     assert set(content(evaluated)) == files
     assert [path.name for path in evaluated.parent.iterdir()] == ["out"]
     assert read_config(evaluated / "config.yaml") == TrackerConfig()
@@ -396,7 +396,7 @@ def test_eval_score_scores_what_eval_track_wrote(evaluated: Path, run: Run, tmp_
     out = tmp_path / "deep" / "mine.json"
     said = run("eval", "score", "--dataset", SOURCE, "--results", evaluated / "results.csv", "--out", out)
     assert (said.code, said.out) == (0, ""), said.err
-    assert set(content(out.parent)) == {"mine.json", "mine.html"}
+    assert set(content(out.parent)) == {"mine.json", "mine.html", "mine.md"}
     scores = json.loads(out.read_text())
     assert scores["metrics"]["pooled"]["instances"] == 6  # no reference frame is told to it
     assert scores["metrics"]["pooled"]["adds_auc"] > 95
@@ -419,7 +419,7 @@ def test_eval_score_measures_vsd_and_takes_a_list_of_symmetric_objects(
     assert (protocol["symmetric_objects"], protocol["symmetric_objects_are"]) == ([BOX], "the user's list")
 
 
-@pytest.mark.parametrize("name", ["mine.json", "mine.html"])
+@pytest.mark.parametrize("name", ["mine.json", "mine.html", "mine.md"])
 def test_eval_score_replaces_scores_and_page_only_when_it_is_asked_to(
     name: str, evaluated: Path, run: Run, tmp_path: Path
 ) -> None:

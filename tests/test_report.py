@@ -1,9 +1,12 @@
-"""Scores as a file, a table, and a page that stands alone."""
+"""Scores as a file and as tables; a page that stands alone, and Markdown that says the same."""
 
 from __future__ import annotations
 
 import json
 import re
+import shutil
+import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.metadata import version
 from pathlib import Path
@@ -12,10 +15,17 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from eval.frame_record import FrameRecord
+from eval.html_report import write_html
 from eval.instances import InstanceError
-from eval.plots import HEIGHT, LARGEST_MM, WIDTH, error_curve, error_over_time
-from eval.report import TABLES, environment, tables, write_html, write_scores
+from eval.markdown_report import write_markdown
+from eval.published import PUBLISHED
+from eval.reliability import reliability
+from eval.report import Report, environment, write_scores
 from eval.score import Metrics, Scores
+from eval.score_tables import TABLES, tables
+from eval.worst_frames import missing_poses, worst_instances
+from eval.worst_pictures import WorstFrame, jpeg
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
 NUMBERS = re.compile(r"-?\d+(?:\.\d+)?")
@@ -79,27 +89,54 @@ SCORES = Scores(
     per_object={"mug": metrics(61.1), "a <b> & 'c'": metrics(71.1)},
     instances=ROWS,
 )
+RECORDS = tuple(
+    FrameRecord(r.scene_id, r.image_id, r.object_id, "lost" if r.missing else "tracking", 0.0 if r.missing else 0.85,
+                "too few <matches> | 3 of 12" if r.missing else "")
+    for r in ROWS
+)  # fmt: skip
+PICTURE = jpeg(np.full((240, 320, 3), 90, np.uint8))
 EXTRA = {"latency_ms": {"median": 31.25, "p95": 48.0, "stages": {"matching": 4.5}}, "environment": {"python": "3.11"}}
+
+
+REPORT = Report(
+    "Tracking <synthetic> & more",
+    SCORES,
+    EXTRA,
+    RECORDS,
+    anchors=("not the same data",) * len(PUBLISHED),
+    why_not_ycbv="synthetic is not YCB-V",
+    reliability=reliability(ROWS, {(r.scene_id, r.object_id, r.image_id): r.confidence for r in RECORDS}),
+    worst=tuple(WorstFrame(row, 0.85, PICTURE) for row in worst_instances(ROWS)),
+    missing=tuple(missing_poses(ROWS, RECORDS)),
+)
+BARE = Report("mine.csv", SCORES, {"environment": {"python": "3.11"}}, missing=tuple(missing_poses(ROWS, ())))
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
+
+
+def read(report: Report, folder: Path) -> Page:
+    write_html(folder / "report.html", report)
+    return Page((folder / "report.html").read_text(encoding="utf-8"))
 
 
 @pytest.fixture
 def page(tmp_path: Path) -> Page:
-    write_html(tmp_path / "report.html", SCORES, EXTRA, "Tracking <synthetic> & more")
-    return Page((tmp_path / "report.html").read_text(encoding="utf-8"))
+    return read(REPORT, tmp_path)
 
 
 def test_the_page_is_well_formed_and_says_what_it_is(page: Page) -> None:
     assert page.tags[0][0] == "html"
     assert page.text.count("Tracking <synthetic> & more") == 2  # title and heading, escaped
-    assert {"table", "svg", "dl", "h1", "h2"} <= {tag for tag, _ in page.tags}
+    assert {"table", "svg", "dl", "h1", "h2", "img"} <= {tag for tag, _ in page.tags}
 
 
-def test_the_page_stands_alone_without_a_script_or_a_link(page: Page, tmp_path: Path) -> None:
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert not {"script", "link", "img", "iframe", "object", "a"} & {tag for tag, _ in page.tags}
-    assert not {"src", "href", "srcset", "data"} & {name for _, attributes in page.tags for name in attributes}
+def test_the_page_stands_alone(page: Page, tmp_path: Path) -> None:
+    text = re.sub(r'src="data:image/jpeg;base64,[\w+/=]+"', "", (tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert not {"link", "iframe", "object", "a"} & {tag for tag, _ in page.tags}
+    assert not {"href", "srcset", "data"} & {name for _, attributes in page.tags for name in attributes}
     assert not [name for _, attributes in page.tags for name in attributes if name.startswith("on")]
-    assert not re.search(r"https?:|//|@import|url\(", text)
+    assert not re.search(r"https?:|//|@import|url\(|\bsrc=|fetch|XMLHttp", text)
+    policies = [a["content"] or "" for tag, a in page.tags if tag == "meta" and "http-equiv" in a]
+    assert [policy.partition(";")[0] for policy in policies] == ["default-src 'none'"]
 
 
 def test_the_tables_of_the_page_hold_the_numbers(page: Page) -> None:
@@ -110,7 +147,16 @@ def test_the_tables_of_the_page_hold_the_numbers(page: Page) -> None:
         expected = (*SCORES.per_object.values(), SCORES.mean_of_objects, SCORES.pooled)
         for row, values in zip(rows, expected, strict=True):
             assert row[1:] == [f"{values[name]:.{digits}f}" for name, (_, digits) in columns.items()]
-    assert len(page.rows) == 5 * len(TABLES)
+
+
+def test_published_numbers_stand_beside_the_run_s_with_what_they_depend_on(page: Page) -> None:
+    start = page.rows.index(["method", "ADD", "ADD-S", "data"])
+    ours, *others = page.rows[start + 1 : start + 2 + len(PUBLISHED)]
+    assert ours == ["this run", f"{SCORES.pooled['add_auc']:.1f}", f"{SCORES.pooled['adds_auc']:.1f}", "-"]
+    assert ["ConceptPose", "90.1", "95.4", "not the same data"] in others
+    assert ["PoseCNN+ICP", "79.3", "93.0", "not the same data"] in others
+    assert "Not the same data: synthetic is not YCB-V." in page.text
+    assert all(published.convention in page.text for published in PUBLISHED)
 
 
 def test_the_page_holds_the_whole_protocol_and_what_is_beside_it(page: Page) -> None:
@@ -126,51 +172,104 @@ def test_the_page_holds_the_whole_protocol_and_what_is_beside_it(page: Page) -> 
 
 def test_a_metric_that_was_not_measured_is_a_dash(tmp_path: Path) -> None:
     some = {"add_auc": 50.0, "adds_auc": float("nan"), "instances": 3}
-    scores = Scores({}, some, some, {"mug": some}, ())
-    write_html(tmp_path / "report.html", scores, {}, "empty")
-    rows = Page((tmp_path / "report.html").read_text()).rows
+    rows = read(Report("empty", Scores({}, some, some, {"mug": some}, ()), {}), tmp_path).rows
     assert [row[1:] for row in rows[1:4]] == [["50.0", "-", "-", "-", "-", "3", "-", "-"]] * 3
     assert {cell for row in (*rows[5:8], *rows[9:]) for cell in row[1:]} == {"-"}
 
 
-def test_the_curve_is_the_share_of_instances_under_each_error() -> None:
-    errors_m = np.array([row.add_m for row in ROWS])
-    (points,) = re.findall(r'<polyline points="([^"]+)"', error_curve({"ADD": errors_m}))
-    places = np.array([[float(number) for number in pair.split(",")] for pair in points.split()])
-    limits_mm = (places[:, 0] - places[0, 0]) / np.ptp(places[:, 0]) * 20
-    shares = (places[0, 1] - places[:, 1]) / (places[0, 1] - 28)  # from the lower edge to the upper one, 28 pixels down
-    expected = [(errors_m * 1000 <= limit + 1e-6).mean() for limit in limits_mm]
-    assert np.allclose(shares, expected, atol=0.01)
-    assert shares[-1] == pytest.approx(0.6)
+SECTIONS = (
+    "How large are the errors?",
+    "When do they happen?",
+    "Is the confidence",
+    "Where does the time go?",
+    "Worst f",
+)
 
 
-def test_every_instance_is_a_dot_in_its_scene_and_missing_poses_are_on_the_upper_edge() -> None:
-    plots = error_over_time(ROWS).split("</svg>")
-    dots = [re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)".*?<title>([^<]+)', plot) for plot in plots]
-    assert [len(of_scene) for of_scene in dots] == [4, 1, 0]
-    heights = [float(y) for _, y, _ in dots[0]]
-    assert heights == sorted(heights, reverse=True)  # larger errors are higher up
-    assert heights[3] == float(dots[1][0][1])  # a missing pose and one that is far off
-    assert dots[0][3][2] == f"object mug, image 3: {LARGEST_MM:.1f} mm"
-    columns = [float(x) for x, _, _ in dots[0]]
-    assert np.allclose(np.diff(columns), np.diff(columns)[0], atol=0.2)
+def test_a_section_without_data_is_one_line_that_says_why(page: Page, tmp_path: Path) -> None:
+    assert [section for section in SECTIONS if section not in page.text] == []
+    assert not re.search(r"\bNo (reliability|stage|worst|comparison)", page.text)
+    bare = read(BARE, tmp_path)
+    assert [section for section in SECTIONS if section in bare.text] == list(SECTIONS[:2])
+    lines = ("No reliability diagram: no pose", "No stage timings: nothing was timed", "No worst frames", "No states")
+    assert [line for line in lines if bare.text.count(line) != 1] == []
+    assert ["1", "mug", "1", "the results have no row of it", "3"] in bare.rows
+    nothing = read(Report("none", Scores({}, {}, {}, {}, ()), {}), tmp_path)
+    assert not [section for section in SECTIONS if section in nothing.text]
+    assert "No list of missing poses: every instance has a pose." in nothing.text
 
 
-@pytest.mark.parametrize("rows", [ROWS, ROWS[:1], (instance(5, np.inf),), (instance(0, 0.0),), ()])
-def test_plots_stay_inside_their_frame_whatever_the_errors(rows: tuple[InstanceError, ...]) -> None:
-    errors_m = np.array([row.add_m for row in rows])
-    for drawing in (error_curve({"ADD": errors_m, "ADD-S": errors_m}), error_over_time(rows)):
-        assert not re.search(r"\b(nan|inf)\b", drawing)
-        for name, limit in (("c?x[12]?", WIDTH), ("c?y[12]?", HEIGHT)):
-            assert all(0 <= float(n) <= limit for n in re.findall(rf' {name}="([^"]+)"', drawing))
-        for points in re.findall(r'points="([^"]+)"', drawing):
-            x, y = np.array([float(n) for n in NUMBERS.findall(points)]).reshape(-1, 2).T
-            assert 0 <= x.min() <= x.max() <= WIDTH
-            assert 0 <= y.min() <= y.max() <= HEIGHT
+def test_worst_frames_are_pictures_with_their_errors_or_say_why_they_are_not(page: Page, tmp_path: Path) -> None:
+    pictures = [attributes for tag, attributes in page.tags if tag == "img"]
+    assert [p["alt"] for p in pictures] == [f"mug, scene {s}, image {i}" for s, i in ((4, 7), (1, 2), (1, 1), (1, 0))]
+    assert "ADD 300.0 mm, 1.0°, 300.0 mm off, confidence 0.85" in page.text
+    assert ["1", "mug", "1", "lost: too few <matches> | 3 of 12", "3"] in page.rows
+    unread = replace(REPORT, worst=(WorstFrame(ROWS[0], 0.5, None, "<gone>"),))
+    assert "No picture: <gone>" in read(unread, tmp_path).text
 
 
-def test_names_are_escaped_in_plots() -> None:
-    Page(error_over_time([instance(0, 0.001, object_id='<i> & "x"')]))
+def markdown_tables(text: str) -> list[list[list[str]]]:
+    """The cells of every table, as they are read on GitHub."""
+    blocks = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
+    cells = [[re.split(r"(?<!\\)\|", line)[1:-1] for line in block.splitlines()] for block in blocks]
+    return [[[re.sub(r"\\(.)", r"\1", c.strip().strip("*")) for c in row] for row in block] for block in cells]
+
+
+def test_the_markdown_says_what_the_json_says(tmp_path: Path) -> None:
+    write_markdown(tmp_path / "report.md", REPORT)
+    write_scores(tmp_path / "scores.json", SCORES, EXTRA)
+    metrics = json.loads((tmp_path / "scores.json").read_text())["metrics"]
+    expected = {**metrics["per_object"], "mean of objects": metrics["mean_of_objects"], "pooled": metrics["pooled"]}
+    found = markdown_tables((tmp_path / "report.md").read_text(encoding="utf-8"))
+    for (_, columns, _), (heading, aligned, *rows) in zip(TABLES, found[: len(TABLES)], strict=True):
+        assert heading == ["object", *(name for name, _ in columns.values())]
+        assert len(aligned) == len(heading)
+        assert [row[0] for row in rows] == list(expected)
+        for name, *row in rows:
+            assert row == [f"{expected[name][key]:.{digits}f}" for key, (_, digits) in columns.items()]
+
+
+def test_the_markdown_has_the_page_s_other_tables_and_the_protocol(tmp_path: Path) -> None:
+    write_markdown(tmp_path / "report.md", REPORT)
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    rows = [row for block in markdown_tables(text) for row in block]
+    assert {len({len(row) for row in block}) for block in markdown_tables(text)} == {1}
+    assert ["PoseCNN", "53.7", "75.9", "not the same data"] in rows
+    assert ["0.8 to 0.9", "4", "85.0", "75.0"] in rows
+    assert ["whole, p95", "48.0"] in rows
+    assert ["4", "7", "mug", "300.0", "150.0", "1.0", "0.85"] in rows
+    assert ["1", "mug", "1", "lost: too few <matches> | 3 of 12", "3"] in rows
+    assert "- masks: visib\n" in text
+    write_markdown(tmp_path / "bare.md", BARE)
+    assert "Worst frames" not in (tmp_path / "bare.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium, chromium-browser, google-chrome or chrome on this machine")
+def test_a_browser_sorts_its_tables_decodes_its_pictures_and_has_nothing_to_complain_of(tmp_path: Path) -> None:
+    values = ("9.5", "10.25", "-", "100")
+    objects = {f"o{k}": {"add_auc": float("nan" if v == "-" else v)} for k, v in enumerate(values)}
+    write_html(tmp_path / "report.html", replace(REPORT, scores=replace(SCORES, per_object=objects)))
+    asked = """<script>
+const table = document.querySelector("table.sortable"), heading = table.tHead.rows[0].cells[1];
+const names = () => [...table.rows].slice(1).map((row) => row.cells[0].textContent).join(" ");
+const told = [names()];
+for (let k = 0; k < 2; k++) { heading.querySelector("button").click(); told.push(heading.ariaSort + " " + names()); }
+told.push([...document.images].map((image) => image.naturalWidth).join(" "));
+document.title = told.join("; ");
+</script>"""
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    (tmp_path / "asked.html").write_text(text.replace("</body>", f"{asked}</body>"), encoding="utf-8")
+    line = (str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0")
+    line += (f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", (tmp_path / "asked.html").as_uri())
+    ran = subprocess.run(line, capture_output=True, text=True, timeout=120, check=True)  # noqa: S603
+    assert "CONSOLE" not in ran.stderr, ran.stderr
+    (title,) = re.findall(r"<title>(.*?)</title>\n<style>", ran.stdout)
+    totals = "mean of objects pooled"
+    before, ascending, descending, widths = title.split("; ")
+    assert before == f"o0 o1 o2 o3 {totals}"
+    assert ascending == f"ascending o0 o1 o3 o2 {totals}"
+    assert descending == f"descending o3 o1 o0 o2 {totals}"
+    assert widths == "320 320 320 320"
 
 
 def test_the_file_of_scores_has_the_layout_that_others_rely_on(tmp_path: Path) -> None:
