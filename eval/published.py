@@ -13,9 +13,7 @@ YCBV_SCENES = tuple(range(48, 60))
 # The archive ycbv_base.zip of BOP has it; pictures that somebody rendered at the same poses come without.
 YCBV_CAMERA_FILE = "camera_uw.json"
 FEW_SHOT = "no CAD model; BOP's test targets; area up to 10 cm, its integration and averaging are not stated"
-POSECNN = (
-    "CAD models; the 2949 keyframes; ADD and ADD-S of every object, area up to 10 cm (VOCap), all twelve sequences"
-)
+POSECNN = "CAD models; all 2949 keyframes; ADD and ADD-S of every object, area up to 10 cm (VOCap), twelve sequences"
 
 
 @dataclass(frozen=True, slots=True)

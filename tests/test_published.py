@@ -53,7 +53,7 @@ def test_what_lacks_one_of_its_facts_is_not_ycbv_and_the_fact_is_named(ycbv: str
 
 
 def test_ycb_video_in_its_own_layout_needs_its_keyframes() -> None:
-    names = list(YCB_VIDEO_CLASSES)
+    names: list[str] = list(YCB_VIDEO_CLASSES)
     assert why("ycb-video:x", KEYFRAME_RULE, objects=names) is None
     assert "keyframes" in str(why("ycb-video:x", "every frame (there is no keyframe.txt)", objects=names))
 
