@@ -87,7 +87,7 @@ def _stages(report: Report) -> str:
 
 def _worst(report: Report) -> str:
     if not report.worst:
-        return _absent("worst frames", "there is not one pose to draw")
+        return _absent("drawing of worst frames", "there is not one pose to draw")
     about = "The largest ADD(-S), the worst first: the true pose green, the estimate red."
     return f"<h2>Worst frames</h2><p>{about}</p>{_grid(*map(_overlay, report.worst))}"
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from typing import Literal
 
@@ -78,6 +79,19 @@ def hidden_in(*indices: int) -> Callable[[Frame], Frame]:
         return replace(frame, masks={BOX: np.zeros_like(frame.masks[BOX])})
 
     return hide
+
+
+def test_every_step_leaves_a_record_that_json_can_hold(protocol: Protocol) -> None:
+    tracked = track_dataset(SyntheticDataset(Edited(hidden_in(3))), protocol)
+    assert [(r.scene_id, r.image_id, r.object_id) for r in tracked.records] == [(1, k, BOX) for k in range(6)]
+    assert len(tracked.records) == len(tracked.timings_ms)
+    states = [r.state for r in tracked.records]
+    assert states[3] == "lost"
+    assert states.count("tracking") == 5
+    scores = {e.image_id: e.score for e in tracked.estimates}
+    assert [r.confidence for r in tracked.records] == [scores.get(k, 0.0) for k in range(6)]
+    assert tracked.records[3].reason
+    assert json.loads(json.dumps([asdict(r) for r in tracked.records])) == [asdict(r) for r in tracked.records]
 
 
 def test_every_frame_is_tracked_in_order_and_every_pose_is_kept(tracked: Tracked) -> None:

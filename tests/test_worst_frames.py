@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 import pytest
 
 from eval.bop_results import Estimate
-from eval.datasets.synthetic import SyntheticDataset, open_synthetic
+from eval.datasets import Target
+from eval.datasets.synthetic import SyntheticDataset
 from eval.frame_record import FrameRecord
 from eval.instances import InstanceError, measure
 from eval.worst_frames import MissingPoses, missing_poses, worst_instances
@@ -18,8 +19,12 @@ from eval.worst_pictures import ESTIMATE, LARGEST_BYTES, SIZE, TRUTH, draw_cutou
 from tracker.errors import FrameError, SourceError
 from tracker.frame import Frame, PosedFrame
 from tracker.geometry import Pose
+from tracker.sources import Sighting
+from tracker.sources.synthetic import ObjectShape, open_scene
 from tracker.viewer import box_corners
 
+BOX = "tea_box"
+SMALL = open_scene(f"turn?size=160x120&frames=6&object={BOX}")
 CORNERS = box_corners(np.array([[-0.05, -0.05, -0.05], [0.05, 0.05, 0.05]]))
 
 
@@ -95,46 +100,49 @@ def test_a_picture_fits_its_bytes_whatever_is_in_it() -> None:
     assert np.abs(read[:, :, ::-1].astype(int) - smooth).max() < 5  # and RGB stays RGB
 
 
-class Counted(SyntheticDataset):
-    """The small scene, with a note of every picture that is read, some of which cannot be."""
+@dataclass(frozen=True)
+class Counted:
+    """The small scene, with a note of every picture that is read; picture 4 cannot be."""
 
-    def __init__(self, broken: int = -1) -> None:
-        dataset = open_synthetic("turn?size=160x120&frames=6&object=tea_box")
-        super().__init__(dataset._scene)
-        self.read: list[int] = []
-        scene, read = dataset.scene(1), self.read
+    name: str = "counted"
+    object_ids: tuple[str, ...] = (BOX,)
+    read: list[int] = field(default_factory=list)
 
-        class Scene:
-            def __getitem__(self, index: int) -> Frame:
-                read.append(index)
-                if index == broken:
-                    raise SourceError("rgb/000004.png: cannot be read")
-                return scene[index]
+    def __len__(self) -> int:
+        return len(SMALL)
 
-            def __getattr__(self, name: str) -> object:
-                return getattr(scene, name)
+    def __getitem__(self, index: int) -> Frame:
+        self.read.append(index)
+        if index == 4:
+            raise SourceError("rgb/000004.png: cannot be read")
+        return SMALL[index]
 
-        self.counted = Scene()
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[index] for index in range(len(self)))
 
-    def scene(self, scene_id: int):
-        return self.counted
+    def sightings(self, object_id: str) -> Sequence[Sighting]:
+        return SMALL.sightings(object_id)
+
+    def shape(self, object_id: str) -> ObjectShape:
+        return SMALL.shape(object_id)
 
 
-def estimates_of(dataset: SyntheticDataset, off_m: dict[int, float]) -> list[Estimate]:
-    moved = {t.image_id: replace(t.T_cam_obj, translation_m=t.T_cam_obj.translation_m + [off_m.get(t.image_id, 0), 0, 0])
-             for t in dataset.targets(1)}  # fmt: skip
-    return [Estimate(1, image_id, 1, 0.7, pose) for image_id, pose in moved.items() if off_m.get(image_id) != np.inf]
+def shifted(target: Target, x_m: float) -> Estimate:
+    moved = replace(target.T_cam_obj, translation_m=target.T_cam_obj.translation_m + np.array([x_m, 0, 0]))
+    return Estimate(1, target.image_id, 1, 0.7, moved)
 
 
 def test_only_the_worst_frames_are_read_again_and_one_that_cannot_be_is_told() -> None:
-    plain = open_synthetic("turn?size=160x120&frames=6&object=tea_box")
-    estimates = estimates_of(plain, {4: 0.05, 2: 0.03, 1: np.inf})
-    rows = measure(plain, estimates).errors
-    dataset = Counted(broken=4)
-    found = worst_frames(dataset, [row for row in rows if row.image_id in (1, 2, 4)], estimates)
+    targets = SyntheticDataset(SMALL).targets(1)
+    estimates = [shifted(targets[2], 0.03), shifted(targets[4], 0.05)]
+    rows = measure(SyntheticDataset(SMALL), estimates).errors
+    source = Counted()
+    found = worst_frames(SyntheticDataset(source), rows, estimates)
     assert [w.row.image_id for w in found] == [4, 2]
-    assert dataset.read == [4, 2]
+    assert source.read == [4, 2]
     assert (found[0].jpeg, found[0].why_not) == (None, "rgb/000004.png: cannot be read")
     assert found[1].jpeg is not None
     assert found[1].score == 0.7
-    assert cv2.imdecode(np.frombuffer(found[1].jpeg, np.uint8), cv2.IMREAD_COLOR).shape == (240, 320, 3)
+    read = cv2.imdecode(np.frombuffer(found[1].jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert read is not None
+    assert read.shape == (240, 320, 3)
