@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from eval.datasets import Dataset
 from eval.frame_record import FrameRecord
 from eval.instances import ObjectInImage
 from eval.peers import method_kind, open_method
-from eval.score import TrackingCounts
+from eval.summary import TrackingCounts
 from reference.onboard import onboard, read_reference_frames
 from reference.vocabulary import VocabularySet
 from tracker.concept import ConceptModel
@@ -39,10 +40,12 @@ Progress = Callable[[Iterable[Frame], int, str], Iterable[Frame]]
 class Protocol:
     """How a dataset is tracked. views: reference frames an object and scene, picked from its own frames.
     poses: which of a result's poses count. vocabularies: the concepts of each object, None for the backend's own.
-    method: "ours", or a peer as `eval.peers` has it. initialisation: "gt" tells the method each object's true pose,
-    once a scene, in the first frame where the object is visible.
+    concepts: only the first so many of them, all where there are fewer. method: "ours", or a peer as `eval.peers` has
+    it. initialisation: "gt" tells the method each object's true pose, once a scene, in the first frame where the object
+    is visible.
 
-    Raises ConfigError where the method does not exist, or cannot do with that initialisation."""
+    Raises ConfigError where the method does not exist, or cannot do with that initialisation, or with no view or
+    concept."""
 
     backend: SaliencyBackend
     config: TrackerConfig
@@ -51,13 +54,23 @@ class Protocol:
     vocabularies: VocabularySet | None = None
     method: str = "ours"
     initialisation: Literal["estimated", "gt"] = "estimated"
+    concepts: int | None = None
 
     def __post_init__(self) -> None:
+        if self.views < 1:
+            raise ConfigError(f"--views: at least one reference frame is needed, got {self.views}")
+        if self.concepts is not None and self.concepts < 1:
+            raise ConfigError(f"--concepts: at least one concept is needed, got {self.concepts}")
         start = method_kind(self.method).start
         if start == "needed" and self.initialisation != "gt":
             raise ConfigError(f"method {self.method} goes on from a pose that it is told: it needs --init gt")
         if start == "used" and self.initialisation == "gt" and not self.config.prior:
             raise ConfigError(f"method {self.method} uses no start with the prior off: --init gt needs --prior on")
+
+    def labels_of(self, object_id: str) -> tuple[str, ...] | None:
+        """The concepts to look for on an object; None leaves the choice to the backend."""
+        labels = self.vocabularies.for_object(object_id).labels if self.vocabularies else None
+        return labels if self.concepts is None else (labels or self.backend.labels_for(None))[: self.concepts]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +85,19 @@ class Tracked:
     timings_ms: list[dict[str, float]] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     records: list[FrameRecord] = field(default_factory=list)
+
+    @classmethod
+    def joined(cls, parts: Iterable[Tracked]) -> Tracked:
+        """Several scenes as one, in their order; an object's counts are summed."""
+        whole = cls()
+        for part in parts:
+            whole.estimates.extend(part.estimates)
+            whole.reference_frames.update(part.reference_frames)
+            whole.timings_ms.extend(part.timings_ms)
+            whole.refused.update(part.refused)
+            for object_id, counts in part.counts.items():
+                whole.counts[object_id] = counts + whole.counts.get(object_id, TrackingCounts(0, 0, 0))
+        return whole
 
     def latency_ms(self) -> dict[str, object]:
         """Median and 95th percentile of an object's whole step, and the median of every stage where it ran."""
@@ -95,28 +121,42 @@ def track_dataset(
 
     viewer: makes one a scene. Raises SourceError where the dataset does not have what is asked for.
     """
+    return Tracked.joined(
+        track_scene(dataset, scene_id, protocol, object_ids, partial(viewer, scene_id), progress)
+        for scene_id in (dataset.scene_ids if scene_ids is None else scene_ids)
+    )
+
+
+def track_scene(
+    dataset: Dataset,
+    scene_id: int,
+    protocol: Protocol,
+    object_ids: Sequence[str] | None = None,
+    viewer: Callable[[Sequence[ConceptModel]], Viewer] = lambda models: NullViewer(),  # noqa: ARG005
+    progress: Progress = lambda frames, total, what: frames,  # noqa: ARG005
+) -> Tracked:
+    """The smallest part of a run that depends on no other: a tracker's state runs through the frames of a scene."""
     tracked = Tracked()
-    for scene_id in dataset.scene_ids if scene_ids is None else scene_ids:
-        source = dataset.scene(scene_id)
-        wanted = [o for o in source.object_ids if object_ids is None or o in object_ids]
-        models = _onboard(dataset, scene_id, wanted, protocol, tracked)
-        if not models:
-            continue
-        tracker = open_method(protocol.method, models, protocol.config, protocol.backend)
-        truth, visible = _truth(source, [model.object_id for model in models])
-        untold = [model.object_id for model in models] if protocol.initialisation == "gt" else []
-        shown = viewer(scene_id, models)
-        try:
-            for frame in progress(source, len(source), f"scene {scene_id}"):
-                for object_id in [o for o in untold if (frame.index, o) in visible]:
-                    tracker.place(object_id, truth[frame.index][object_id], frame.stamp_ns)
-                    untold.remove(object_id)
-                results = tracker.step(frame)
-                shown.show(frame, results, truth[frame.index])
-                seen = [(frame.index, result.object_id) in visible for result in results]
-                _record(tracked, dataset, scene_id, frame.index, results, seen, protocol)
-        finally:
-            shown.close()
+    source = dataset.scene(scene_id)
+    wanted = [o for o in source.object_ids if object_ids is None or o in object_ids]
+    models = _onboard(dataset, scene_id, wanted, protocol, tracked)
+    if not models:
+        return tracked
+    tracker = open_method(protocol.method, models, protocol.config, protocol.backend)
+    truth, visible = _truth(source, [model.object_id for model in models])
+    untold = [model.object_id for model in models] if protocol.initialisation == "gt" else []
+    shown = viewer(models)
+    try:
+        for frame in progress(source, len(source), f"scene {scene_id}"):
+            for object_id in [o for o in untold if (frame.index, o) in visible]:
+                tracker.place(object_id, truth[frame.index][object_id], frame.stamp_ns)
+                untold.remove(object_id)
+            results = tracker.step(frame)
+            shown.show(frame, results, truth[frame.index])
+            seen = [(frame.index, result.object_id) in visible for result in results]
+            _record(tracked, dataset, scene_id, frame.index, results, seen, protocol)
+    finally:
+        shown.close()
     return tracked
 
 
@@ -129,7 +169,7 @@ def _onboard(
     for object_id in object_ids:
         try:
             frames = read_reference_frames(dataset.scene(scene_id), object_id, protocol.views)
-            labels = protocol.vocabularies.for_object(object_id).labels if protocol.vocabularies else None
+            labels = protocol.labels_of(object_id)
             models.append(onboard(frames, protocol.backend, config.view, config.cloud, labels))
         except OnboardingError as error:
             log.warning("scene %d: %s", scene_id, error)
@@ -167,11 +207,8 @@ def _record(
         tracked.timings_ms.append(result.timings_ms)
         tracked.records.append(FrameRecord.of(scene_id, image_id, result))
         before = tracked.counts.get(result.object_id, TrackingCounts(0, 0, 0))
-        tracked.counts[result.object_id] = TrackingCounts(
-            frames=before.frames + 1,
-            lost=before.lost + (result.state is TrackState.LOST),
-            false_tracks=before.false_tracks + (result.pose is not None and not visible),
-        )
+        lost, unseen = result.state is TrackState.LOST, result.pose is not None and not visible
+        tracked.counts[result.object_id] = before + TrackingCounts(1, int(lost), int(unseen))
         pose = result.pose if protocol.poses == "filtered" else result.raw_pose
         if pose is not None:
             number = dataset.number(result.object_id)

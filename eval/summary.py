@@ -41,6 +41,11 @@ class TrackingCounts:
     lost: int
     false_tracks: int
 
+    def __add__(self, other: TrackingCounts) -> TrackingCounts:
+        return TrackingCounts(
+            self.frames + other.frames, self.lost + other.lost, self.false_tracks + other.false_tracks
+        )
+
 
 def metrics_of(rows: Sequence[InstanceError]) -> Metrics:
     """AUCs, recalls, shares and the mean IoU in percent, `ar*` as fractions; what was not measured is not in it."""
