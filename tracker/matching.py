@@ -20,15 +20,17 @@ DISTINCT_POINTS = 2000  # of the model, among which a place's look-alikes are so
 
 class MatchingConfig(BaseModel):
     """measure: of how unlike two concept vectors are. temperature: tau of the softmax that makes saliency a
-    distribution over concepts. query_points: at most so many points of the cloud are matched, spread evenly over it
-    (the paper's cap). per_point: how many points of the model each is matched to. mutual: keep only matches that are
-    the best in both directions. kept: at most so many matches, those of the greatest margin.
+    distribution over concepts. binary: a point has a concept or has it not (`binary_maps`), to compare with masks.
+    query_points: at most so many points of the cloud are matched, spread evenly over it (the paper's cap).
+    per_point: how many points of the model each is matched to. mutual: keep only matches that are the best in both
+    directions. kept: at most so many matches, those of the greatest margin.
     memory_mb: bound on the block of the similarity matrix that is held at a time."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     measure: Measure = "forward"
     temperature: float = Field(default=0.3, gt=0)
+    binary: bool = False
     query_points: int = Field(default=1500, ge=50, le=10_000)
     per_point: int = Field(default=1, ge=1, le=32)
     mutual: bool = False
@@ -62,20 +64,28 @@ def concept_vectors(saliency: torch.Tensor, temperature: float) -> torch.Tensor:
     return torch.log_softmax(saliency.float() / temperature, dim=1)
 
 
+def binary_maps(saliency: torch.Tensor) -> torch.Tensor:
+    """(N, L) saliency -> (N, L) of 0 and 1: where a concept is stronger than on average over these points.
+
+    The paper cuts at 0.5, maps that are stretched to [0, 1] on each picture. Ours are not, and a concept that is faint
+    or everywhere would be lost at 0.5; the mean is a cut that every concept has points on both sides of.
+    """
+    return (saliency > saliency.mean(dim=0)).to(saliency.dtype)
+
+
 class Matcher:
     """For each point of a cloud the model's points of least divergence, the paper's Eq. 3."""
 
     def __init__(self, model: ConceptModel, config: MatchingConfig, device: torch.device) -> None:
         self._config, self._device = config, device
-        log_model = concept_vectors(torch.from_numpy(model.saliency).to(device), config.temperature)
+        log_model = self._vectors(model.saliency)
         self._model = encode_model(log_model, config.measure).T.contiguous()
         self._distinctness = self._look_alikes(model, log_model)
 
     def __call__(self, cloud: PointCloud) -> Correspondences:
         config = self._config
         chosen = np.linspace(0, len(cloud) - 1, min(len(cloud), config.query_points)).round().astype(np.intp)
-        saliency = torch.from_numpy(cloud.saliency[chosen]).to(self._device)
-        query = encode_query(concept_vectors(saliency, config.temperature), config.measure)
+        query = encode_query(self._vectors(cloud.saliency[chosen]), config.measure)
         per_point = min(config.per_point, self._model.shape[1])
         likeness, nearest, backward = self._greatest(query, per_point)
         divergence = (query.own.unsqueeze(1) - likeness).clamp_min(0)
@@ -92,6 +102,10 @@ class Matcher:
         if len(found) > config.kept:
             found = found[np.sort(np.argsort(-found.margin, kind="stable")[: config.kept])]
         return found
+
+    def _vectors(self, saliency: Float32s) -> torch.Tensor:
+        maps = torch.from_numpy(saliency).to(self._device)
+        return concept_vectors(binary_maps(maps) if self._config.binary else maps, self._config.temperature)
 
     def _greatest(self, query: Encoded, per_point: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """(N, k) greatest likenesses of every query and their model points, block by block; and (M,) every model

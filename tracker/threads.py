@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 
 import torch
 
@@ -19,10 +19,12 @@ def torch_threads(count: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def one_thread() -> AbstractContextManager[None]:
+@contextmanager
+def one_thread() -> Iterator[None]:
     """Within, torch computes on the calling thread alone; afterwards as before.
 
     For many operations on small tensors: sharing them out gains next to nothing, and where other work holds a core,
     every operation waits for the thread that does not get to run.
     """
-    return torch_threads(1)
+    with torch_threads(1):
+        yield

@@ -1,0 +1,10 @@
+"""x"""
+
+from dataclasses import dataclass
+
+
+@dataclass
+class Ablate:
+    """x"""
+
+    def __call__(self) -> None: ...

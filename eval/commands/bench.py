@@ -1,0 +1,26 @@
+"""`python -m eval bench`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from eval.bench.registration import RegistrationBench
+from eval.bench.saliency import SaliencyBench
+from eval.bench.scoring import ScoringBench
+
+
+@dataclass
+class Bench:
+    """Measure speed: of saliency and registration as ratios between ways of the same work in one run."""
+
+    what: tyro.conf.OmitArgPrefixes[
+        Annotated[SaliencyBench, tyro.conf.subcommand("saliency", prefix_name=False)]
+        | Annotated[RegistrationBench, tyro.conf.subcommand("registration", prefix_name=False)]
+        | Annotated[ScoringBench, tyro.conf.subcommand("scoring", prefix_name=False)]
+    ]
+
+    def __call__(self) -> None:
+        self.what()
