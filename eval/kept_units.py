@@ -1,7 +1,7 @@
 """Scenes that are finished, on disk: each a folder that is whole or absent, named by what decided its content.
 
 FOLDER/FINGERPRINT/estimates.csv  BOP's result file, which comes back bit for bit
-                   unit.json      counts, times, reference frames, refused objects, and what decided them
+                   unit.json      counts, times, records, reference frames, refused objects, and what decided them
                    overlay.mp4    where a video was asked for
 """
 
@@ -12,9 +12,11 @@ import logging
 import os
 import shutil
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 
 from eval.bop_results import read_results, write_results
+from eval.frame_record import FrameRecord
 from eval.predict import Tracked
 from eval.summary import TrackingCounts
 from eval.track_run import fingerprint_of
@@ -57,6 +59,7 @@ class KeptUnits:
                 counts={object_id: TrackingCounts(**counts) for object_id, counts in content["counts"].items()},
                 timings_ms=content["timings_ms"],
                 refused=content["refused"],
+                records=[FrameRecord(**record) for record in content["records"]],
             )
         except (OSError, KeyError, TypeError, ValueError, AttributeError, OutputError) as error:
             log.warning("%s: cannot be used (%s) and is tracked again", folder, error)
@@ -83,12 +86,10 @@ class KeptUnits:
             "decided_by": decided_by,
             "estimates": len(tracked.estimates),
             "references": sorted(tracked.reference_frames),
-            "counts": {
-                object_id: {name: getattr(counts, name) for name in counts.__slots__}
-                for object_id, counts in tracked.counts.items()
-            },
+            "counts": {object_id: asdict(counts) for object_id, counts in tracked.counts.items()},
             "timings_ms": tracked.timings_ms,
             "refused": tracked.refused,
+            "records": [asdict(record) for record in tracked.records],
         }
         write_results(staged / ESTIMATES, tracked.estimates)
         try:

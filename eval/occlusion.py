@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import linregress
@@ -86,7 +87,7 @@ def line(hidden: np.ndarray, error_mm: np.ndarray) -> Line:
 
 def _bands(hidden: np.ndarray, errors_mm: Mapping[str, np.ndarray]) -> list[Band]:
     bands = []
-    for low, high in zip(EDGES, EDGES[1:], strict=False):
+    for low, high in pairwise(EDGES):
         chosen = (hidden >= low) & ((hidden < high) | (high == EDGES[-1]))
         there = chosen & np.isfinite(errors_mm["add"])
         add, adds = (float(np.median(errors_mm[name][there])) if there.any() else None for name in ("add", "adds"))

@@ -95,6 +95,7 @@ class Tracked:
             whole.reference_frames.update(part.reference_frames)
             whole.timings_ms.extend(part.timings_ms)
             whole.refused.update(part.refused)
+            whole.records.extend(part.records)
             for object_id, counts in part.counts.items():
                 whole.counts[object_id] = counts + whole.counts.get(object_id, TrackingCounts(0, 0, 0))
         return whole

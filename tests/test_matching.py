@@ -15,7 +15,7 @@ from scipy.special import log_softmax, rel_entr, softmax
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
 from tracker.geometry import Pose
-from tracker.matching import Correspondences, Matcher, MatchingConfig, concept_vectors
+from tracker.matching import Correspondences, Matcher, MatchingConfig, binary_maps, concept_vectors
 
 CPU = torch.device("cpu")
 SEEDS = st.integers(0, 10_000)
@@ -230,3 +230,17 @@ def test_matching_ten_thousand_points_to_ten_thousand_holds_little_memory() -> N
         found = matcher(cloud_with(before.numpy()))
     assert max(largest) <= 64 * 2**20
     assert np.array_equal(found.model_index, np.arange(10_000))
+
+
+def test_binary_maps_are_one_where_a_concept_is_stronger_than_on_average() -> None:
+    saliency = torch.tensor([[0.9, 0.02, 0.5], [0.1, 0.01, 0.5], [0.3, 0.06, 0.5]])
+    assert binary_maps(saliency).tolist() == [[1, 0, 0], [0, 0, 0], [0, 1, 0]]
+
+
+def test_matching_by_binary_maps_forgets_how_strong_a_concept_is() -> None:
+    strong, faint = np.eye(3, dtype=np.float32), 0.4 * np.eye(3, dtype=np.float32)
+    soft, binary = MatchingConfig(), MatchingConfig(binary=True)
+    found = {config.binary: Matcher(model_with(strong), config, CPU)(cloud_with(faint)) for config in (soft, binary)}
+    assert found[True].model_index.tolist() == [0, 1, 2]
+    assert found[True].divergence == pytest.approx(0, abs=1e-6)
+    assert (found[False].divergence > 0.1).all()

@@ -110,5 +110,5 @@ class Ablate:
         if failed:
             names = ", ".join(repr(result.cell.name) for result in failed)
             raise ConfigError(
-                f"{len(failed)} of {len(results)} cells could not be run: {names}; {out}/ablation.md says why"
+                f"{len(failed)} of {len(results)} cells were not run: {names}; {out}/ablation.md says why"
             )
