@@ -9,9 +9,9 @@ import tyro
 
 from eval.commands.ablate import Ablate
 from eval.commands.bench import Bench
+from eval.commands.pairs import Pairs
 from eval.commands.score import Score
 from eval.commands.track import Track
-from eval.pairs.command import Pairs
 from tracker.terminal import run
 
 

@@ -54,7 +54,9 @@ def worst_frames(
     }
     found = []
     for row in worst:
-        answer = best[row.scene_id, row.image_id, dataset.number(row.object_id)]
+        answer = best.get((row.scene_id, row.image_id, dataset.number(row.object_id)))
+        if answer is None:  # of a query of several pairs, nobody says which pose the row is of
+            continue
         target = targets[row.scene_id, row.object_id, row.image_id]
         try:
             frame = dataset.scene(row.scene_id)[target.index]

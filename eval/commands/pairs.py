@@ -61,15 +61,19 @@ class Pairs:
     """Replace results that are in the --out folder."""
 
     def __call__(self) -> None:
+        from collections import Counter
         from contextlib import ExitStack
 
         from eval.datasets import open_dataset
+        from eval.html_report import write_html
+        from eval.markdown_report import write_markdown
         from eval.pairs.one_shot import OneShot, answer_pairs, estimates_of, score_pairs
         from eval.pairs.output import write_answers, write_result_files
         from eval.pairs.pair_lists import write_pairs
         from eval.peers import method_kind
         from eval.predict import Tracked
-        from eval.report import environment, tables, write_html, write_scores
+        from eval.report import environment, make_report, write_scores
+        from eval.score_tables import tables
         from reference.vocabulary import read_vocabulary
         from tracker.config import dump_config, read_config
         from tracker.output import result_folder
@@ -103,9 +107,14 @@ class Pairs:
                 extra = {"latency_ms": latency_ms, "environment": environment()}
                 write_pairs(folder / "pairs.csv", pairs, dataset)
                 write_answers(folder / "poses.jsonl", pairs, answered.answers, scores.instances)
-                write_result_files(folder, estimates_of(pairs, answered.answers, dataset))
+                estimates = estimates_of(pairs, answered.answers, dataset)
+                write_result_files(folder, estimates)
                 write_scores(folder / "scores.json", scores, extra)
-                write_html(folder / "report.html", scores, extra, f"Pairs of {self.dataset}")
+                times_asked = Counter((e.scene_id, e.image_id, e.object_id) for e in estimates if e)
+                drawn = [e for e in estimates if e and times_asked[e.scene_id, e.image_id, e.object_id] == 1]
+                report = make_report(f"Pairs of {self.dataset}", dataset, scores, drawn, extra)
+                write_html(folder / "report.html", report)
+                write_markdown(folder / "report.md", report)
                 (folder / "config.yaml").write_text(dump_config(one_shot.config))
         who = f"backend {self.backend}" if kind.concepts else f"method {self.method}"
         for each in tables(scores, f"{self.dataset}, {len(pairs)} {stated['kind']} pairs, {who}"):
