@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -41,7 +41,7 @@ class Spreading:
 def spread(
     work: Callable[[Item], Result], items: Sequence[Item], spreading: Spreading, threads: int = 1
 ) -> Iterator[tuple[int, Result]]:
-    """(position of the item, what the work made of it), as they are finished.
+    """(position of the item, what the work made of it), as they are finished (with ray, as rounds of them are).
 
     work, items, results: can be sent to another process. threads: that libraries may use in each of joblib's own
     processes. Raises whatever the work raises, MissingExtraError where a cluster's package is not installed,
@@ -55,15 +55,22 @@ def spread(
     with ExitStack() as stack:
         if spreading.cluster is None:
             stack.enter_context(parallel_config("loky", inner_max_num_threads=threads))
-            jobs = spreading.jobs
+            jobs, rounds = spreading.jobs, False
         else:
             kind, _, address = spreading.cluster.partition("://")
-            stack.enter_context(CLUSTERS[kind](address, stack))
-            jobs = spreading.jobs if spreading.jobs > 1 else -1
+            workers = CLUSTERS[kind](address, stack)
+            jobs = spreading.jobs if spreading.jobs > 1 else workers or -1
+            rounds = workers is not None
+        calls = [delayed(_placed)(work, place, item) for place, item in enumerate(items)]
+        if rounds:
+            for start in range(0, len(calls), jobs):
+                done: Any = Parallel(n_jobs=jobs)(calls[start : start + jobs])
+                yield from done
+            return
         # One at a time: what is finished comes back at once, not with the rest of a batch.
         alone: dict[str, Any] = {"batch_size": 1}  # joblib declares a text
         pool = Parallel(n_jobs=jobs, return_as="generator_unordered", **alone)
-        found: Any = pool(delayed(_placed)(work, place, item) for place, item in enumerate(items))
+        found: Any = pool(calls)
         yield from found
 
 
@@ -71,7 +78,7 @@ def _placed(work: Callable[[Item], Result], place: int, item: Item) -> tuple[int
     return place, work(item)
 
 
-def _dask(address: str, stack: ExitStack) -> AbstractContextManager[object]:
+def _dask(address: str, stack: ExitStack) -> None:
     from joblib import parallel_config
 
     try:
@@ -82,10 +89,11 @@ def _dask(address: str, stack: ExitStack) -> AbstractContextManager[object]:
         client = stack.enter_context(Client(f"tcp://{address}", timeout=CONNECT_S, set_as_default=False))
     except (OSError, ValueError) as error:
         raise ConfigError(f"--cluster dask://{address}: no scheduler answers there ({error})") from error
-    return parallel_config("dask", client=client)
+    stack.enter_context(parallel_config("dask", client=client))
 
 
-def _ray(address: str, stack: ExitStack) -> AbstractContextManager[object]:
+def _ray(address: str, stack: ExitStack) -> int:
+    """Its number of workers: joblib gets nothing back from ray before all is finished, so work is given in rounds."""
     from joblib import parallel_config
 
     try:
@@ -98,7 +106,9 @@ def _ray(address: str, stack: ExitStack) -> AbstractContextManager[object]:
     except (OSError, ConnectionError, ValueError) as error:
         raise ConfigError(f"--cluster ray://{address}: no cluster answers there ({error})") from error
     register_ray()
-    return parallel_config("ray")
+    stack.enter_context(parallel_config("ray"))
+    return max(1, int(ray.cluster_resources().get("CPU", 1)))
 
 
-CLUSTERS: dict[str, Callable[[str, ExitStack], AbstractContextManager[object]]] = {"dask": _dask, "ray": _ray}
+# Each enters joblib's backend for the cluster at the address, and says how many get work at a time: None, as it comes.
+CLUSTERS: dict[str, Callable[[str, ExitStack], int | None]] = {"dask": _dask, "ray": _ray}
