@@ -28,13 +28,19 @@ def not_the_same(preset: Preset) -> str:
 
 
 def terminal_table(preset: Preset, results: Sequence[CellResult]) -> Table:
+    """A row a cell, and under it the paper's where it has one: side by side they are too wide for a terminal."""
     legend = not_the_same(preset)
-    out = Table(title=preset.title, caption=legend, caption_justify="left", box=SIMPLE_HEAD, padding=(0, 1))
-    headings, rows = _cells(preset, results)
-    for place, heading in enumerate(headings):
-        out.add_column(heading, justify="right" if place else "left", style="dim" if "paper" in heading else "")
-    for row in rows:
-        out.add_row(*row)
+    out = Table(
+        title=preset.title, caption=legend, caption_justify="left", box=SIMPLE_HEAD, padding=(0, 0), pad_edge=False
+    )
+    for column in ("", *preset.columns):
+        heading = COLUMNS[column][0] if column else ""
+        out.add_column(heading, justify="right" if column else "left", min_width=5 if column else None)
+    for result in results:
+        out.add_row(result.cell.name, *(_text(result.value(column), column) for column in preset.columns))
+        if result.cell.paper:
+            told = (_text(result.cell.paper.get(column), column) for column in preset.columns)
+            out.add_row("  paper", *told, style="dim")
     return out
 
 

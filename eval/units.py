@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from eval.datasets import require
 from eval.kept_units import VIDEO, KeptUnits
 from eval.predict import Progress, Tracked, track_scene
 from eval.spread import Spreading, spread
@@ -44,6 +45,11 @@ def units_of(run: TrackRun, scene_ids: Sequence[int], video: bool = False) -> tu
 
     Raises ConfigError and SourceError where the run cannot be.
     """
+    dataset = opened_dataset(run.dataset)
+    for scene_id in scene_ids:
+        require("scene", scene_id, dataset.scene_ids, dataset.name)
+    for object_id in run.object_ids or ():
+        require("object", object_id, dataset.object_ids, dataset.name)
     backend = run.protocol().backend
     decided = [run.decided_by(scene_id, backend) | {"video": video} for scene_id in scene_ids]
     units = [Unit(run, s, d, code_fingerprint(), video) for s, d in zip(scene_ids, decided, strict=True)]
