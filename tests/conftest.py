@@ -53,8 +53,10 @@ def can_scene() -> SyntheticScene:
 
 @pytest.fixture(scope="session")
 def can_model(can_scene: SyntheticScene, attributes: SaliencyBackend) -> ConceptModel:
-    """Of three frames of `can_scene`, from its two ends and its middle."""
-    return onboard(read_reference_frames(can_scene, "soup_can", 3), attributes)
+    """Of three frames of `can_scene`, from its two ends and its middle, whatever onboarding would choose."""
+    sightings = can_scene.sightings("soup_can")
+    frames = [(can_scene[k], sightings[k].T_cam_obj) for k in (5, 53, 86)]
+    return onboard([PosedFrame(frame, "soup_can", pose, frame.masks["soup_can"]) for frame, pose in frames], attributes)
 
 
 @pytest.fixture(scope="session")
