@@ -53,9 +53,9 @@ def can_scene() -> SyntheticScene:
 
 @pytest.fixture(scope="session")
 def can_model(can_scene: SyntheticScene, attributes: SaliencyBackend) -> ConceptModel:
-    """Of three frames of `can_scene`, from its two ends and its middle, whatever onboarding would choose."""
+    """Of three frames of `can_scene`, from its middle and its two ends, whatever onboarding would choose."""
     sightings = can_scene.sightings("soup_can")
-    frames = [(can_scene[k], sightings[k].T_cam_obj) for k in (5, 53, 86)]
+    frames = [(can_scene[k], sightings[k].T_cam_obj) for k in (53, 5, 86)]
     return onboard([PosedFrame(frame, "soup_can", pose, frame.masks["soup_can"]) for frame, pose in frames], attributes)
 
 
