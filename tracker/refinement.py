@@ -22,7 +22,8 @@ from tracker.view import Float32s, ObjectView
 LEAST_POINTS = 20  # fewer do not carry six degrees of freedom
 COARSE_POINTS = 1500  # at most, while colours are smoothed: there more of them say the same again
 FACING_LEAST = 0.15  # cosine: more grazing surfaces have no depth and no colour worth using
-PLAIN_VARIANCE = 20.0  # squared Lab units: a surface of less contrast than this has no map of colours to be seen
+PLAIN_VARIANCE = 20.0  # squared Lab units: a surface of less contrast than this has no gain to be seen
+GAIN_RANGE = (0.6, 1.6)
 
 
 class RefinementConfig(BaseModel):
@@ -139,20 +140,19 @@ class Refiner:
         return _Linearised(matrix, vector, float(np.median(np.abs(residual_m))), len(usable))
 
     def _colour_residuals(self, seen: Float32s, expected: Floats, facing: Floats) -> tuple[Floats, Floats]:
-        """Residuals (3, N) of the Lab channels and their weights, after the affine map of colours between model and
-        picture is taken off, towards none where there is no contrast to tell: it is exposure and white balance, which
-        mixes the channels. Robust by Geman and McClure's function."""
+        """Residuals (3, N) of the Lab channels and their weights, after each channel's gain and offset between model
+        and picture are taken off: they are exposure and white balance. Robust by Geman and McClure's function."""
         facing = facing.astype(np.float32)
         robust, residual, sigma = facing * np.ones_like(seen), expected - seen, np.ones_like(seen[:, :1])
         for _ in range(2):
             share = robust / (robust.sum(axis=1, keepdims=True) + 1e-9)
             mean_seen = (share * seen).sum(axis=1, keepdims=True)
             centred = expected - (share * expected).sum(axis=1, keepdims=True)
-            leaning = share.mean(axis=0) * centred
-            variance = leaning @ centred.T + PLAIN_VARIANCE * np.eye(3)
-            together = (seen - mean_seen) @ leaning.T + PLAIN_VARIANCE * np.eye(3)
-            gain = np.asarray(np.linalg.solve(variance, together.T).T, np.float32)
-            residual = gain @ centred + mean_seen - seen
+            leaning = share * centred
+            variance = (leaning * centred).sum(axis=1, keepdims=True)
+            together = (leaning * (seen - mean_seen)).sum(axis=1, keepdims=True)
+            gain = np.clip((together + PLAIN_VARIANCE) / (variance + PLAIN_VARIANCE), *GAIN_RANGE)
+            residual = gain * centred + mean_seen - seen
             spread = np.median(np.abs(residual[:, ::2]), axis=1, keepdims=True)  # of half: it takes the most time here
             sigma = np.maximum(1.4826 * spread, self._config.lab_sigma)
             robust = facing / (1 + (residual / (2 * sigma)) ** 2) ** 2
