@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,10 +11,10 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from eval.ablation import CellResult
+from eval.environment import environment
 from eval.occlusion import Line, Occlusion
 from eval.preset import COLUMNS, Preset
-from eval.report import environment
-from tracker.errors import OutputError
+from tracker.whole_file import write_whole
 
 ERRORS = {"add": "ADD", "adds": "ADD-S"}
 
@@ -88,13 +87,7 @@ def write_ablation(folder: Path, preset: Preset, results: Sequence[CellResult], 
     """ablation.json and ablation.md, each whole or not at all. Raises OutputError where they cannot be written."""
     content = json.dumps(as_json(preset, results, facts), indent=1, allow_nan=False) + "\n"
     for name, text in (("ablation.json", content), ("ablation.md", markdown(preset, results, facts))):
-        partial = folder / f".{name}.{os.getpid()}.partial"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            partial.write_text(text, encoding="utf-8")
-            partial.replace(folder / name)
-        except OSError as error:
-            raise OutputError(f"{folder / name}: cannot be written ({error.strerror})") from error
+        write_whole(folder / name, text)
 
 
 def _cells(preset: Preset, results: Sequence[CellResult]) -> tuple[list[str], list[list[str]]]:

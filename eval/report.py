@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
-import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from eval.bop_results import Estimate
@@ -18,9 +15,7 @@ from eval.reliability import Reliability, reliability
 from eval.score import Scores
 from eval.worst_frames import MissingPoses, missing_poses
 from eval.worst_pictures import WorstFrame, worst_frames
-from tracker.errors import OutputError
-
-PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")
+from tracker.whole_file import write_whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,28 +62,6 @@ def make_report(
     )
 
 
-def environment() -> dict[str, str]:
-    """What the run ran on: machine and versions, so that a table can be made again."""
-    versions = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    for package in PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            versions[package] = "not installed as a package"
-    return versions
-
-
 def write_scores(path: Path, scores: Scores, extra: Mapping[str, object]) -> None:
-    """scores.json: protocol and metrics, and beside them what the caller adds."""
-    path.write_text(json.dumps({**scores.as_json(), **extra}, indent=1, allow_nan=False) + "\n")
-
-
-def write_figures(path: Path, figures: Mapping[str, object]) -> None:
-    """Figures of a measurement as JSON, with what it ran on; whole or not at all. Raises OutputError."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(json.dumps({**figures, "environment": environment()}, indent=1, allow_nan=False) + "\n")
-        partial.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+    """scores.json: protocol and metrics, and beside them what the caller adds. Raises OutputError."""
+    write_whole(path, json.dumps({**scores.as_json(), **extra}, indent=1, allow_nan=False) + "\n")

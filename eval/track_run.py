@@ -7,11 +7,11 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache, lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
 
 from eval.datasets import Dataset, open_dataset
+from eval.environment import package_versions
 from eval.peers import method_kind
 from eval.predict import Protocol
 from reference.vocabulary import VocabularySet
@@ -22,7 +22,6 @@ from tracker.saliency import BackendOptions, SaliencyBackend, open_backend
 ROOT = Path(__file__).resolve().parents[1]
 # What poses come out of. A page or a table may change without a pose being computed again.
 DECIDE = ("tracker", "reference", "eval/datasets", "eval/peers", "eval/predict.py", "eval/bop_results.py")
-PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +101,7 @@ class TrackRun:
             "poses": self.poses,
             "threads": self.threads,
             "code": code_fingerprint(),
-            "packages": _versions(),
+            "packages": package_versions(),
         }
 
 
@@ -127,17 +126,6 @@ def code_fingerprint() -> str:
 
 def _sources(path: Path) -> list[Path]:
     return [path] if path.is_file() else list(path.rglob("*.py"))
-
-
-@cache
-def _versions() -> dict[str, str]:
-    versions = {}
-    for package in PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            versions[package] = "not installed as a package"
-    return versions
 
 
 @lru_cache(maxsize=1)

@@ -8,7 +8,7 @@ import trimesh
 
 from tracker.geometry import Floats
 
-SAME_RAD = 1e-6
+SAME_RAD = 1e-6  # directions nearer than this are copies
 ALIKE_RAD = 0.05  # sets that differ by less than this are equally wide: directions are snapped to a sphere before
 
 

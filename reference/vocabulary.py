@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
 import reprlib
 from collections import Counter
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from tracker.errors import ConfigError, OutputError
+from tracker.errors import ConfigError
+from tracker.whole_file import write_whole
 
 SHIPPED = Path(__file__).with_name("vocabularies")
 LONGEST_LABEL = 64
@@ -164,15 +163,7 @@ def write_vocabulary(path: str | Path, vocabularies: VocabularySet) -> None:
     ]
     content = {"name": vocabularies.name, "vocabularies": entries}
     text = HEADER + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    except OSError as error:
-        with suppress(OSError):
-            partial.unlink()
-        raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+    write_whole(path, text)
 
 
 def _vocabulary(entry: Any, where: str, source: str) -> Vocabulary:

@@ -15,13 +15,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from eval.environment import environment
 from eval.frame_record import FrameRecord
 from eval.html_report import write_html
 from eval.instances import InstanceError
 from eval.markdown_report import write_markdown
 from eval.published import PUBLISHED
 from eval.reliability import reliability
-from eval.report import Report, environment, write_scores
+from eval.report import Report, write_scores
 from eval.score import Metrics, Scores
 from eval.score_tables import TABLES, tables
 from eval.worst_frames import missing_poses, worst_instances

@@ -6,8 +6,6 @@ On disk it is a safetensors file: arrays and a JSON header, nothing that could r
 from __future__ import annotations
 
 import json
-import os
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ import numpy as np
 import safetensors
 import safetensors.numpy
 
-from tracker.errors import ModelError, OutputError
+from tracker.errors import ModelError
 from tracker.frame import PosedFrame
 from tracker.geometry import Floats
 from tracker.grounding import ground
@@ -25,6 +23,7 @@ from tracker.region import Region, region_of
 from tracker.saliency import SaliencyBackend, open_backend
 from tracker.symmetry import NO_SYMMETRY, Symmetry
 from tracker.view import Float32s
+from tracker.whole_file import write_whole
 
 FORMAT_VERSION = 2
 FORMAT = "conceptrack concept model"
@@ -114,15 +113,7 @@ class ConceptModel:
         }
         arrays = {name: np.ascontiguousarray(getattr(self, name)) for name in ARRAYS} | views
         content = safetensors.numpy.save(arrays, metadata={"concept_model": json.dumps(header)})
-        partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            partial.write_bytes(content)
-            os.replace(partial, path)
-        except OSError as error:
-            with suppress(OSError):
-                partial.unlink()
-            raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+        write_whole(path, content)
 
     @classmethod
     def load(cls, path: str | Path) -> ConceptModel:

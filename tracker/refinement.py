@@ -27,8 +27,7 @@ GAIN_RANGE = (0.6, 1.6)
 
 
 class RefinementConfig(BaseModel):
-    """model_points: how many take part. coarse_steps, fine_steps: iterations on smoothed and on fine colours, at most.
-    settled: a step that moves the object by less than this share of its radius ends them.
+    """model_points: how many take part. coarse_steps, fine_steps: iterations on smoothed and on fine colours.
     depth_sigma_m: noise of the pooled depth; at the first step it is taken to be depth_sigma_start times that.
     lab_sigma: least noise assumed in colour. colour_weight: of the colour terms against the depth term.
     offset_information: how surely colour and depth are registered, in inverse squared view pixels."""
@@ -38,7 +37,6 @@ class RefinementConfig(BaseModel):
     model_points: int = Field(default=1000, ge=50)
     coarse_steps: int = Field(default=4, ge=0)
     fine_steps: int = Field(default=4, ge=1)
-    settled: float = Field(default=4e-4, ge=0)
     depth_sigma_m: float = Field(default=0.0015, gt=0)
     depth_sigma_start: float = Field(default=2.7, ge=1)
     lab_sigma: float = Field(default=2.0, gt=0)
@@ -96,16 +94,12 @@ class Refiner:
             config.depth_sigma_start, 1, config.coarse_steps + config.fine_steps
         )
         levels = (1,) * config.coarse_steps + (0,) * config.fine_steps
-        linear, settled, last = None, None, len(levels) - 1
-        for step, (sigma_m, level) in enumerate(zip(sigmas_m, levels, strict=True)):
-            if level == settled and step < last:
-                continue
+        linear = None
+        for sigma_m, level in zip(sigmas_m, levels, strict=True):
             linear = self._linearise(T_cam_obj, view, appearance, float(sigma_m), level)
             if linear is None:
                 return None
-            before, T_cam_obj = T_cam_obj, moved(T_cam_obj, linear.matrix, linear.vector)
-            moved_m = before.distance_to_m(T_cam_obj) + before.angle_to_rad(T_cam_obj) * self._radius_m
-            settled = level if moved_m < config.settled * self._radius_m else None
+            T_cam_obj = moved(T_cam_obj, linear.matrix, linear.vector)
         if linear is None:
             return None
         free = free_directions(linear.matrix, self._radius_m)

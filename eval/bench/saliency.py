@@ -40,7 +40,7 @@ class SaliencyBench:
 
     def __call__(self) -> None:
         from eval.bench.random_network import save_random_siglip
-        from eval.report import write_figures
+        from eval.environment import write_figures
         from tracker.output import require_free
 
         if self.json:

@@ -35,7 +35,7 @@ class ScoringBench:
     """Replace the file if it exists."""
 
     def __call__(self) -> None:
-        from eval.report import write_figures
+        from eval.environment import write_figures
         from tracker.output import require_free
 
         if self.json:

@@ -65,6 +65,7 @@ class Pairs:
         from contextlib import ExitStack
 
         from eval.datasets import open_dataset
+        from eval.environment import environment
         from eval.html_report import write_html
         from eval.markdown_report import write_markdown
         from eval.pairs.one_shot import OneShot, answer_pairs, estimates_of, score_pairs
@@ -72,7 +73,7 @@ class Pairs:
         from eval.pairs.pair_lists import write_pairs
         from eval.peers import method_kind
         from eval.predict import Tracked
-        from eval.report import environment, make_report, write_scores
+        from eval.report import make_report, write_scores
         from eval.score_tables import tables
         from reference.vocabulary import read_vocabulary
         from tracker.config import dump_config, read_config

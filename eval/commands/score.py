@@ -42,9 +42,10 @@ class Score:
     def __call__(self) -> None:
         from eval.bop_results import read_results
         from eval.datasets import open_dataset
+        from eval.environment import environment
         from eval.html_report import write_html
         from eval.markdown_report import write_markdown
-        from eval.report import environment, make_report, write_scores
+        from eval.report import make_report, write_scores
         from eval.score import score_results_file
         from eval.score_tables import tables
         from tracker.errors import ConfigError

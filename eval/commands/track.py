@@ -77,12 +77,12 @@ class Track:
         from contextlib import ExitStack
 
         from eval.bop_results import write_results
-        from eval.datasets import require
+        from eval.environment import environment
         from eval.html_report import write_html
         from eval.markdown_report import write_markdown
         from eval.peers import method_kind
         from eval.predict import Tracked
-        from eval.report import environment, make_report, write_scores
+        from eval.report import make_report, write_scores
         from eval.score import score
         from eval.score_tables import tables
         from eval.spread import Spreading
@@ -102,8 +102,6 @@ class Track:
             raise ConfigError("--resume goes on with what is beside a folder: give --out DIR")
         spreading, run = Spreading(self.jobs, self.cluster), self._run()
         dataset = opened_dataset(self.dataset)
-        for object_id in self.objects or ():
-            require("object", object_id, dataset.object_ids, dataset.name)
         scene_ids = tuple(dataset.scene_ids if self.scenes is None else self.scenes)
         units, stated = units_of(run, scene_ids, self.view != "none")
         if self.out:

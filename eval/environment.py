@@ -1,0 +1,35 @@
+"""What a measurement ran on, so that it can be made again."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from tracker.whole_file import write_whole
+
+PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")
+
+
+def package_versions() -> dict[str, str]:
+    """Of the packages that numbers come out of."""
+    versions = {}
+    for package in PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "not installed as a package"
+    return versions
+
+
+def environment() -> dict[str, str]:
+    """Machine and versions."""
+    machine = f"{platform.system()} {platform.machine()}"
+    return {"python": platform.python_version(), "machine": machine, **package_versions()}
+
+
+def write_figures(path: Path, figures: Mapping[str, object]) -> None:
+    """Figures of a measurement as JSON, with what it ran on; whole or not at all. Raises OutputError."""
+    write_whole(path, json.dumps({**figures, "environment": environment()}, indent=1, allow_nan=False) + "\n")

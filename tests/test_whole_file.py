@@ -1,0 +1,44 @@
+"""A file is what was to be written, or what it was before."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tracker.errors import OutputError
+from tracker.whole_file import write_whole
+
+
+@pytest.mark.parametrize(("content", "stored"), [("5°\n", "5°\n".encode()), (b"\r\n\x00", b"\r\n\x00"), ("", b"")])
+def test_it_holds_what_was_written_to_the_byte_and_nothing_is_left_beside_it(
+    content: str | bytes, stored: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "deep" / "down" / "file.txt"
+    for _ in range(2):
+        write_whole(path, content)
+    assert path.read_bytes() == stored
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_what_was_there_stays_until_the_new_one_is_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "file.txt"
+    write_whole(path, "before")
+
+    def fails(source: Path, target: Path) -> None:
+        assert Path(source).read_bytes() == b"after"
+        assert Path(target).read_bytes() == b"before"
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", fails)
+    with pytest.raises(OutputError, match=r"file\.txt: cannot be written \(No space left"):
+        write_whole(path, "after")
+    assert path.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_in_the_way_of_its_folder_is_said(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(OutputError, match=r"taken/file\.txt: cannot be written"):
+        write_whole(tmp_path / "taken" / "file.txt", "x")
