@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from eval.bop_results import Estimate
-from eval.datasets import Dataset
+from eval.datasets import Dataset, MaskKind
 from eval.frame_record import FrameRecord
 from eval.instances import ObjectInImage
 from eval.peers import method_kind, open_method
@@ -42,7 +42,7 @@ class Protocol:
     poses: which of a result's poses count. vocabularies: the concepts of each object, None for the backend's own.
     concepts: only the first so many of them, all where there are fewer. method: "ours", or a peer as `eval.peers` has
     it. initialisation: "gt" tells the method each object's true pose, once a scene, in the first frame where the object
-    is visible.
+    is visible. masks: which the dataset's frames have, those that models are made of too.
 
     Raises ConfigError where the method does not exist, or cannot do with that initialisation, or with no view or
     concept."""
@@ -55,6 +55,7 @@ class Protocol:
     method: str = "ours"
     initialisation: Literal["estimated", "gt"] = "estimated"
     concepts: int | None = None
+    masks: MaskKind = "visib"
 
     def __post_init__(self) -> None:
         if self.views < 1:
@@ -138,7 +139,7 @@ def track_scene(
 ) -> Tracked:
     """The smallest part of a run that depends on no other: a tracker's state runs through the frames of a scene."""
     tracked = Tracked()
-    source = dataset.scene(scene_id)
+    source = dataset.scene(scene_id, protocol.masks)
     wanted = [o for o in source.object_ids if object_ids is None or o in object_ids]
     models = _onboard(dataset, scene_id, wanted, protocol, tracked)
     if not models:
@@ -169,7 +170,7 @@ def _onboard(
     config = protocol.config
     for object_id in object_ids:
         try:
-            frames = read_reference_frames(dataset.scene(scene_id), object_id, protocol.views)
+            frames = read_reference_frames(dataset.scene(scene_id, protocol.masks), object_id, protocol.views)
             labels = protocol.labels_of(object_id)
             models.append(onboard(frames, protocol.backend, config.view, config.cloud, labels))
         except OnboardingError as error:

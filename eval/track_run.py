@@ -10,7 +10,7 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Literal
 
-from eval.datasets import Dataset, open_dataset
+from eval.datasets import Dataset, MaskKind, open_dataset
 from eval.environment import package_versions
 from eval.peers import method_kind
 from eval.predict import Protocol
@@ -22,6 +22,10 @@ from tracker.saliency import BackendOptions, SaliencyBackend, open_backend
 ROOT = Path(__file__).resolve().parents[1]
 # What poses come out of. A page or a table may change without a pose being computed again.
 DECIDE = ("tracker", "reference", "eval/datasets", "eval/peers", "eval/predict.py", "eval/bop_results.py")
+MASKS = {
+    "visib": "the dataset's visible masks",
+    "full": "the dataset's full masks: whole silhouettes, with the pixels of whatever hides the object",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +33,9 @@ class TrackRun:
     """How a dataset is tracked, by names: `eval.predict.Protocol` has the meaning of the fields, with what was opened.
 
     dataset: as `eval.datasets` opens it. vocabulary: its name, for the report; vocabularies: what is in it, so that no
-    file has to be where a unit is tracked. object_ids: only these. threads: of torch in a process; another number may
-    change the last digits of a result. Raises ConfigError where `threads` is no number of threads.
+    file has to be where a unit is tracked. object_ids: only these. masks: one of `MASKS`. threads: of torch in a
+    process; another number may change the last digits of a result. Raises ConfigError where `threads` is no number of
+    threads.
     """
 
     dataset: str
@@ -53,6 +58,11 @@ class TrackRun:
         if self.threads < 1:
             raise ConfigError(f"--threads: at least one is needed, got {self.threads}")
 
+    @property
+    def given_masks(self) -> MaskKind:
+        """Which of the dataset's masks its frames have."""
+        return "full" if self.masks == "full" else "visib"
+
     def protocol(self) -> Protocol:
         """Opens the backend, once a process. Raises ConfigError where the parts do not go together."""
         return Protocol(
@@ -64,6 +74,7 @@ class TrackRun:
             method=self.method,
             initialisation=self.initialisation,
             concepts=self.concepts,
+            masks=self.given_masks,
         )
 
     def stated(self, backend: SaliencyBackend) -> dict[str, object]:
@@ -74,7 +85,7 @@ class TrackRun:
             **kind.stated(self.config, backend, self.vocabulary, self.initialisation),
             "concepts": (self.concepts or "all of the vocabulary") if kind.concepts else "not used by the method",
             "views": self.views,
-            "masks": "the dataset's visible masks",
+            "masks": MASKS[self.masks],
             "reinitialisation": "by the method itself, never from the truth",
             "poses": self.poses,
         }

@@ -47,7 +47,7 @@ def units_of(run: TrackRun, scene_ids: Sequence[int], video: bool = False) -> tu
     """
     dataset = opened_dataset(run.dataset)
     for scene_id in scene_ids:
-        require("scene", scene_id, dataset.scene_ids, dataset.name)
+        dataset.scene(scene_id, run.given_masks)  # refuses scenes and masks that are not there
     for object_id in run.object_ids or ():
         require("object", object_id, dataset.object_ids, dataset.name)
     backend = run.protocol().backend

@@ -12,7 +12,7 @@ import pytest
 
 from eval.alignment import align
 from eval.bop_results import Estimate, write_results
-from eval.datasets import ObjectModel, Target, require
+from eval.datasets import MaskKind, ObjectModel, Target, require
 from eval.datasets.synthetic import SyntheticDataset
 from eval.score import score, score_results_file
 from tracker.geometry import Pose
@@ -32,7 +32,7 @@ class Shelf:
     scene_ids = (1, 2)
     object_ids = ("cup", "tin")
 
-    def scene(self, scene_id: int) -> PosedSource:  # noqa: ARG002
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> PosedSource:  # noqa: ARG002
         return open_scene("turn?size=96x72&frames=6")  # for its cameras
 
     def image_ids(self, scene_id: int) -> Sequence[int]:  # noqa: ARG002

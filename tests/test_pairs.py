@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from eval.bop_results import read_results
-from eval.datasets import ObjectModel, Target, require
+from eval.datasets import MaskKind, ObjectModel, Target, require
 from eval.datasets.bop import BopDataset
 from eval.pairs import Pair
 from eval.pairs.drawing import draw_pairs
@@ -44,7 +44,7 @@ class Scenes:
     object_ids: tuple[str, ...] = (CAN, BOX)
     size: str = "240x180"
 
-    def scene(self, scene_id: int) -> SyntheticScene:
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> SyntheticScene:  # noqa: ARG002
         require("scene", scene_id, self.scene_ids, self.name)
         return turning(CAN if scene_id == 4 else BOX, self.size)
 

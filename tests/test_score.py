@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from eval.bop_results import Estimate, write_results
-from eval.datasets import ObjectModel, Target, open_dataset, require
+from eval.datasets import MaskKind, ObjectModel, Target, open_dataset, require
 from eval.datasets.bop import BopDataset
 from eval.score import Scores, TrackingCounts, score, score_results_file
 from tracker.errors import OutputError, SourceError
@@ -68,7 +68,7 @@ class Table:
     scene_ids = (1,)
     object_ids = ("cup", "tin")
 
-    def scene(self, scene_id: int) -> PosedSource:  # noqa: ARG002
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> PosedSource:  # noqa: ARG002
         return Still()
 
     def image_ids(self, scene_id: int) -> Sequence[int]:  # noqa: ARG002

@@ -44,8 +44,9 @@ class Track:
     """Only the first so many of them. Default: all."""
     views: int = 2
     """Reference frames an object and scene; they are not scored."""
-    masks: Literal["visib"] = "visib"
-    """Where the object's pixels come from: the dataset's masks of what can be seen."""
+    masks: Literal["visib", "full"] = "visib"
+    """Where the object's pixels come from: the dataset's masks of what can be seen, or those of the whole silhouette,
+    also where something hides it (BOP's mask/)."""
     prior: Literal["on", "off"] | None = None
     """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
     poses: Literal["filtered", "raw"] = "filtered"

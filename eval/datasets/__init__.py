@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,8 @@ from tracker.errors import SourceError
 from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.sources import PosedSource
 
+# Of an object's pixels those that can be seen, or its whole silhouette, also where something else hides it.
+MaskKind = Literal["visib", "full"]
 LEAST_VISIBLE_FRACTION = 0.1  # BOP: an instance of which less can be seen is no target
 
 
@@ -90,7 +92,10 @@ class Dataset(Protocol):
     @property
     def object_ids(self) -> tuple[str, ...]: ...
 
-    def scene(self, scene_id: int) -> PosedSource: ...
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> PosedSource:
+        """masks: which its frames have. What is told of an object without reading a frame (visible_px) does not depend
+        on it."""
+        ...
 
     def image_ids(self, scene_id: int) -> Sequence[int]:
         """Number of every image of the scene, by its position in the source."""
@@ -111,6 +116,12 @@ def require(kind: str, asked: object, available: Sequence[object], dataset: str)
     """Raises SourceError unless the dataset has what was asked for; the message lists what it has."""
     if asked not in available:
         raise SourceError(f"{dataset} has no {kind} {asked!r}; it has {', '.join(map(str, available)) or 'none'}")
+
+
+def require_visible_masks(masks: MaskKind, dataset: str) -> None:
+    """At the door of a dataset whose layout has no other masks. Raises SourceError that says so."""
+    if masks != "visib":
+        raise SourceError(f"{dataset} has no {masks} masks; it has visib (what can be seen of an object)")
 
 
 def number_of(object_id: str, names: Sequence[str], dataset: str) -> int:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eval.datasets import LEAST_VISIBLE_FRACTION, ObjectModel, Target, require
+from eval.datasets import LEAST_VISIBLE_FRACTION, MaskKind, ObjectModel, Target, require
 from eval.symmetries import ObjectSymmetries
 from tracker.errors import SourceError
 from tracker.geometry import Floats
@@ -45,7 +45,7 @@ class BopDataset:
         self.scene_ids = tuple(scene_ids(self._path))
         if not self.scene_ids:
             raise SourceError(f"{self.name}: no scene (a folder SSSSSS with scene_camera.json) under {path}")
-        self._scenes: dict[int, BopScene] = {}
+        self._scenes: dict[tuple[int, MaskKind], BopScene] = {}
         self._listed = _read_targets(self._targets_file())
         least = f"at least {LEAST_VISIBLE_FRACTION:.0%} visible, every frame (there is no {TARGETS_FILE})"
         self.target_rule = least if self._listed is None else TARGETS_FILE
@@ -55,11 +55,11 @@ class BopDataset:
         ids = {object_id for scene_id in self.scene_ids for object_id in self.scene(scene_id).object_ids}
         return tuple(sorted(ids, key=int))
 
-    def scene(self, scene_id: int) -> BopScene:
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> BopScene:
         require("scene", scene_id, self.scene_ids, self.name)
-        if scene_id not in self._scenes:
-            self._scenes[scene_id] = BopScene(self._path, scene_id)
-        return self._scenes[scene_id]
+        if (scene_id, masks) not in self._scenes:
+            self._scenes[scene_id, masks] = BopScene(self._path, scene_id, masks)
+        return self._scenes[scene_id, masks]
 
     def image_ids(self, scene_id: int) -> Sequence[int]:
         return self.scene(scene_id).image_ids

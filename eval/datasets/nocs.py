@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from eval.datasets import ObjectModel, Target, name_of, number_of, require
+from eval.datasets import MaskKind, ObjectModel, Target, name_of, number_of, require, require_visible_masks
 from eval.datasets.labelled_scene import Annotation, ImageFiles, LabelledScene
 from eval.datasets.model_files import read_model
 from tracker.errors import SourceError
@@ -68,8 +68,9 @@ class NocsDataset:
     def object_ids(self) -> tuple[str, ...]:
         return tuple(sorted(self._classes))
 
-    def scene(self, scene_id: int) -> LabelledScene:
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> LabelledScene:
         require("scene", scene_id, self.scene_ids, self.name)
+        require_visible_masks(masks, self.name)
         if scene_id not in self._scenes:
             images = _image_files(self._scene_folders[scene_id])
             poses = self._beside(TEXT_POSES) / f"scene_{scene_id}"

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from eval.datasets import LEAST_VISIBLE_FRACTION, ObjectModel, Target, require
+from eval.datasets import LEAST_VISIBLE_FRACTION, MaskKind, ObjectModel, Target, require, require_visible_masks
 from eval.symmetries import ASYMMETRIC, ObjectSymmetries
 from tracker.geometry import Floats
 from tracker.sources import PosedSource
@@ -55,8 +55,9 @@ class SyntheticDataset:
         self.object_ids = tuple(sorted(scene.object_ids))
         self._scene = scene
 
-    def scene(self, scene_id: int) -> PosedSource:
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> PosedSource:
         require("scene", scene_id, self.scene_ids, self.name)
+        require_visible_masks(masks, self.name)
         return self._scene
 
     def image_ids(self, scene_id: int) -> Sequence[int]:

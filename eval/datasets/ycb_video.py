@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.io import loadmat
 
-from eval.datasets import ObjectModel, Target, name_of, number_of, require
+from eval.datasets import MaskKind, ObjectModel, Target, name_of, number_of, require, require_visible_masks
 from eval.datasets.labelled_scene import Annotation, ImageFiles, LabelledScene
 from eval.datasets.model_files import read_model
 from eval.datasets.ycb_objects import YCB_VIDEO_CLASSES, YCB_VIDEO_FRAME, is_symmetric, shape_files
@@ -55,8 +55,9 @@ class YcbVideoDataset:
             raise SourceError(f"{self.name}: no sequence (a folder SSSS){listed} in {self._path}/data")
         self._scenes: dict[int, LabelledScene] = {}
 
-    def scene(self, scene_id: int) -> LabelledScene:
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> LabelledScene:
         require("scene", scene_id, self.scene_ids, self.name)
+        require_visible_masks(masks, self.name)
         if scene_id not in self._scenes:
             images = _image_files(self._path / "data" / f"{scene_id:04d}")
             self._scenes[scene_id] = LabelledScene(

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from eval.datasets import ObjectModel, Target, number_of, require
+from eval.datasets import MaskKind, ObjectModel, Target, number_of, require, require_visible_masks
 from eval.datasets.model_files import read_model
 from eval.datasets.ycb_objects import YCB_VIDEO_CLASSES, YCB_VIDEO_FRAME, is_symmetric, shape_files
 from tracker.errors import SourceError
@@ -50,8 +50,9 @@ class YcbInEoatDataset:
         self.target_rule = f"every frame with an annotated pose; scenes: {listed}"
         self._scenes: dict[int, Folder] = {}
 
-    def scene(self, scene_id: int) -> Folder:
+    def scene(self, scene_id: int, masks: MaskKind = "visib") -> Folder:
         require("scene", scene_id, self.scene_ids, self.name)
+        require_visible_masks(masks, self.name)
         if scene_id not in self._scenes:
             sequence = self._sequences[scene_id - 1]
             name = f"{self.name}:{sequence.resolve().name}"

@@ -1,6 +1,7 @@
 """A scene of a dataset in BOP's layout.
 
     PATH/SPLIT/SSSSSS/rgb/IIIIII.{png,jpg}  depth/IIIIII.png  mask_visib/IIIIII_GGGGGG.png
+                      mask/IIIIII_GGGGGG.png (optional: whole silhouettes, also where something hides them)
                       scene_camera.json  scene_gt.json  scene_gt_info.json
 
 GGGGGG is the position in the image's list of scene_gt.json, not an object id. Camera matrix and depth scale are an
@@ -24,6 +25,7 @@ from tracker.sources import Sighting, require_object
 from tracker.sources.image_files import read_depth_m, read_mask, read_rgb
 
 NOMINAL_RATE_HZ = 30.0  # the layout has no stamps
+MASK_FOLDERS = {"visib": "mask_visib", "full": "mask"}
 DAMAGE = (KeyError, IndexError, TypeError, ValueError)  # what reading an entry of another layout comes to
 
 
@@ -31,14 +33,16 @@ class BopScene:
     """Frames, masks and poses of one scene. Where an object occurs twice in an image, its first entry counts.
 
     path: the dataset, or the folder of a split. masks: which of the layout's mask folders a frame's masks are from.
-    Raises SourceError where a file is missing or damaged.
+    Raises SourceError where a file is missing or damaged, and where full masks are asked for and there are none.
     """
 
     def __init__(self, path: str | Path, scene_id: int, masks: Literal["visib", "full", "none"] = "visib") -> None:
         self.name = f"bop:{path}:{scene_id}"
         self.scene_id = scene_id
         self._folder = find_scene(Path(path), scene_id)
-        self._mask_folder = {"visib": "mask_visib", "full": "mask", "none": None}[masks]
+        self._mask_folder = {**MASK_FOLDERS, "none": None}[masks]
+        if masks == "full":
+            self._require_full_masks()
         self._cameras = _by_image(self._folder / "scene_camera.json")
         truth = self._folder / "scene_gt.json"
         self._truth = _objects_by_image(truth) if truth.exists() else {}
@@ -122,6 +126,16 @@ class BopScene:
             return Sighting(index, T_cam_obj, int(info["px_count_visib"]), float(info["visib_fract"]))
         except DAMAGE as error:
             raise SourceError(f"{self._folder}/scene_gt_info.json: {where}: {error!r}") from error
+
+    def _require_full_masks(self) -> None:
+        """Frames without masks are no error, as a tracker may find the object itself; but whoever asks for these would
+        take frames without them for frames in which nothing is to be seen."""
+        if not (self._folder / MASK_FOLDERS["full"]).is_dir():
+            present = [f"{kind} ({name}/)" for kind, name in MASK_FOLDERS.items() if (self._folder / name).is_dir()]
+            raise SourceError(
+                f"{self.name} has no full masks (a folder {MASK_FOLDERS['full']}/ in {self._folder}); "
+                f"it has {', '.join(present) or 'none'}"
+            )
 
     def _place(self, image_id: int, object_id: str) -> int | None:
         """Position of the object in the image's list."""
