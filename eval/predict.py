@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from eval.bop_results import Estimate
-from eval.datasets import Dataset, MaskKind
+from eval.datasets import Dataset, MaskKind, category_of
 from eval.frame_record import FrameRecord
 from eval.instances import ObjectInImage
 from eval.peers import method_kind, open_method
@@ -68,9 +68,9 @@ class Protocol:
         if start == "used" and self.initialisation == "gt" and not self.config.prior:
             raise ConfigError(f"method {self.method} uses no start with the prior off: --init gt needs --prior on")
 
-    def labels_of(self, object_id: str) -> tuple[str, ...] | None:
+    def labels_of(self, object_id: str, category: str | None = None) -> tuple[str, ...] | None:
         """The concepts to look for on an object; None leaves the choice to the backend."""
-        labels = self.vocabularies.for_object(object_id).labels if self.vocabularies else None
+        labels = self.vocabularies.for_object(object_id, category).labels if self.vocabularies else None
         return labels if self.concepts is None else (labels or self.backend.labels_for(None))[: self.concepts]
 
 
@@ -171,7 +171,7 @@ def _onboard(
     for object_id in object_ids:
         try:
             frames = read_reference_frames(dataset.scene(scene_id, protocol.masks), object_id, protocol.views)
-            labels = protocol.labels_of(object_id)
+            labels = protocol.labels_of(object_id, category_of(dataset, object_id))
             models.append(onboard(frames, protocol.backend, config.view, config.cloud, labels))
         except OnboardingError as error:
             log.warning("scene %d: %s", scene_id, error)

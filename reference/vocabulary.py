@@ -70,20 +70,24 @@ class VocabularySet:
         if twice := sorted(name for name, times in claims.items() if times > 1):
             raise ConfigError(f"vocabularies: several answer to {_listed(twice)}, expected one for each object")
 
-    def for_object(self, object_id: str) -> Vocabulary:
+    def for_object(self, object_id: str, category: str | None = None) -> Vocabulary:
         """The vocabulary of a dataset's object, by its id ("5"), its name ("006_mustard_bottle") or its category
         ("mustard bottle"). A set of one vocabulary without ids has it for every object.
+
+        category: what the dataset says that the object is an instance of ("mug" of "mug_daniel_norm"); it is asked for
+        where there is none for the object itself. It is never guessed from the name: a camera_case is no camera.
 
         Raises ConfigError that lists the objects that there are.
         """
         if len(self.vocabularies) == 1 and not self.vocabularies[0].ids:
             return self.vocabularies[0]
-        wanted = plain_name(object_id)
-        for vocabulary in self.vocabularies:
-            if wanted in vocabulary.answers_to:
-                return vocabulary
+        for wanted in map(plain_name, (object_id, *((category,) if category else ()))):
+            for vocabulary in self.vocabularies:
+                if wanted in vocabulary.answers_to:
+                    return vocabulary
         known = (" = ".join((*vocabulary.ids, vocabulary.category)) for vocabulary in self.vocabularies)
-        raise ConfigError(f"vocabulary {self.name!r} has none for object {object_id!r}; there are {', '.join(known)}")
+        asked = f"object {object_id!r}{f' of category {category!r}' if category else ''}"
+        raise ConfigError(f"vocabulary {self.name!r} has none for {asked}; there are {', '.join(known)}")
 
 
 def plain_name(name: str) -> str:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from eval.datasets import open_dataset
+import eval.predict
+from eval.datasets import category_of, open_dataset
 from eval.datasets.nocs import NocsDataset
+from eval.predict import Protocol, track_scene
+from reference.vocabulary import read_vocabulary
 from tests.recordings import (
     CORNERS_M,
     DIAMETER_M,
@@ -21,7 +25,11 @@ from tests.recordings import (
     write_picture,
     write_text,
 )
-from tracker.errors import SourceError
+from tracker.config import TrackerConfig
+from tracker.errors import ConfigError, OnboardingError, SourceError
+from tracker.frame import PosedFrame
+from tracker.saliency import SaliencyBackend
+from tracker.sources import PosedSource
 
 HEIGHT, WIDTH = 480, 640  # the camera is REAL275's
 MUG, CAN = "mug_daniel_norm", "can_arizona_tea_norm"
@@ -116,6 +124,41 @@ def test_objects_are_numbered_by_name_and_those_of_an_axis_are_symmetric(nocs: P
     assert (dataset.model(MUG).symmetric, dataset.model(CAN).symmetric) == (False, True)
     assert np.allclose(dataset.model(CAN).points_m, CORNERS_M)
     assert dataset.model(CAN).diameter_m == pytest.approx(DIAMETER_M)
+
+
+def test_an_instance_has_the_concepts_of_the_category_that_its_meta_file_says(nocs: Path) -> None:
+    real275 = read_vocabulary("real275")
+    dataset = open_dataset(f"nocs:{nocs}")
+    with pytest.raises(ConfigError, match=f"none for object '{MUG}'; there are 1 = bottle, "):
+        real275.for_object(MUG)
+    found = {name: real275.for_object(name, category_of(dataset, name)).category for name in dataset.object_ids}
+    assert found == {CAN: "can", MUG: "mug"}
+    for scene_id, image_id in ((1, 0), (1, 7), (10, 3)):  # whatever it is called: this one has become a bowl
+        write_text(nocs / "real_test" / f"scene_{scene_id}" / f"{image_id:04d}_meta.txt", META.replace("2 6", "2 2"))
+    assert category_of(NocsDataset(nocs), MUG) == "bowl"
+    with pytest.raises(SourceError, match="has no object 'cup'"):
+        NocsDataset(nocs).category("cup")
+
+
+def test_models_are_made_with_them(nocs: Path, attributes: SaliencyBackend, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: dict[str, tuple[str, ...] | None] = {}
+
+    def noted(frames: Sequence[PosedFrame], *settings: object) -> None:
+        (asked[frames[0].object_id],) = settings[-1:]  # pyright: ignore[reportArgumentType]
+        raise OnboardingError("five pixels make no model")
+
+    monkeypatch.setattr(eval.predict, "onboard", noted)
+    monkeypatch.setattr(eval.predict, "read_reference_frames", _reference_frames)
+    vocabularies = read_vocabulary("real275")
+    track_scene(NocsDataset(nocs), 1, Protocol(attributes, TrackerConfig(), views=1, vocabularies=vocabularies))
+    assert asked == {CAN: vocabularies.for_object("can").labels, MUG: vocabularies.for_object("mug").labels}
+
+
+def _reference_frames(source: PosedSource, object_id: str, views: int) -> list[PosedFrame]:
+    """The first, however little of the object can be seen."""
+    frame = source[0]
+    sighting = source.sightings(object_id)[0]
+    return [PosedFrame(frame, object_id, sighting.T_cam_obj, frame.masks[object_id])][:views]
 
 
 @pytest.mark.parametrize("place", ["real_test", "Real/test"])

@@ -88,6 +88,16 @@ def test_an_object_is_found_by_its_number_its_name_and_its_category(name: str, o
     assert read_vocabulary(name).for_object(object_id).category == category
 
 
+def test_an_instance_is_found_by_the_category_that_it_is_told_to_be_of_after_its_own_name() -> None:
+    two = VocabularySet("two", (MUG, BOWL))
+    assert two.for_object("bowl_shaped_mug", "Mug") is MUG
+    assert two.for_object("bowl", "mug") is BOWL  # what is said of the object itself comes first
+    with pytest.raises(ConfigError, match="none for object 'mug_daniel'; there are"):
+        two.for_object("mug_daniel")  # nothing is guessed from a name
+    with pytest.raises(ConfigError, match="none for object 'mug_daniel' of category 'cup'; there are"):
+        two.for_object("mug_daniel", "cup")
+
+
 def test_an_unknown_object_is_answered_with_those_that_there_are() -> None:
     with pytest.raises(ConfigError, match="'two' has none for object 'spoon'; there are 14 = 025_mug = mug, 13 = "):
         VocabularySet("two", (MUG, BOWL)).for_object("spoon")

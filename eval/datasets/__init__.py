@@ -64,6 +64,14 @@ class CameraSource(Protocol):
     def camera(self, index: int) -> Intrinsics: ...
 
 
+@runtime_checkable
+class CategoryDataset(Protocol):
+    """A dataset whose objects are instances of categories, such as several mugs. An object of another one is known by
+    its own name alone."""
+
+    def category(self, object_id: str) -> str: ...
+
+
 class Dataset(Protocol):
     """Scenes with known poses, the instances in them that count, and the models to measure with.
 
@@ -110,6 +118,11 @@ class Dataset(Protocol):
     def number(self, object_id: str) -> int: ...
 
     def object_with(self, number: int) -> str: ...
+
+
+def category_of(dataset: Dataset, object_id: str) -> str | None:
+    """What the object is an instance of; None where the dataset does not say."""
+    return dataset.category(object_id) if isinstance(dataset, CategoryDataset) else None
 
 
 def require(kind: str, asked: object, available: Sequence[object], dataset: str) -> None:

@@ -92,10 +92,15 @@ class NocsDataset:
             log.warning("%s: %d instances have no file of their pose and are no targets", scene.name, lacking)
         return scene.targets(range(len(scene)), least_px=1)
 
-    def model(self, object_id: str) -> ObjectModel:
+    def category(self, object_id: str) -> str:
+        """The class that meta.txt gives the object, whatever it is called."""
         require("object", object_id, self.object_ids, self.name)
+        return CLASSES[self._classes[object_id]]
+
+    def model(self, object_id: str) -> ObjectModel:
+        symmetric = self.category(object_id) in SYMMETRIC_CLASSES
         file = self._beside("obj_models/real_test") / f"{object_id}.obj"
-        model = read_model([file], CLASSES[self._classes[object_id]] in SYMMETRIC_CLASSES)
+        model = read_model([file], symmetric)
         if file.with_suffix(".txt").exists():
             size_m, found_m = read_numbers(file.with_suffix(".txt"), 3), np.ptp(model.points_m, axis=0)
             if not np.allclose(size_m, found_m, rtol=0.1, atol=0.005):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from eval.bop_results import Estimate
-from eval.datasets import Dataset
+from eval.datasets import Dataset, category_of
 from eval.instances import measure_answers
 from eval.pairs import Pair, View
 from eval.peers import method_kind, open_method
@@ -145,7 +145,9 @@ def _model(dataset: Dataset, anchor: View, one_shot: OneShot) -> ConceptModel | 
     if object_id not in frame.masks:
         return OnboardingError(f"{frame.provenance.source} has no mask of object {object_id!r}")
     posed = PosedFrame(frame, object_id, anchor.target.T_cam_obj, frame.masks[object_id])
-    labels = one_shot.vocabularies.for_object(object_id).labels if one_shot.vocabularies else None
+    labels = None
+    if one_shot.vocabularies:
+        labels = one_shot.vocabularies.for_object(object_id, category_of(dataset, object_id)).labels
     try:
         return onboard([posed], one_shot.backend, one_shot.config.view, one_shot.config.cloud, labels)
     except OnboardingError as error:
