@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
+from eval.html_tables import definitions, html_table
 from eval.page import page
 from eval.plots.error_curve import error_curves
 from eval.plots.error_over_time import error_over_time
@@ -20,15 +21,12 @@ from eval.report_text import (
     about_published,
     latency,
     missing_table,
-    plain,
     published_conventions,
     published_table,
     worst_caption,
 )
 from eval.score_tables import TABLES, headings, object_rows, total_rows
 from eval.worst_pictures import WorstFrame
-
-WORDS = {"data", "reason", "images"}  # columns that may wrap
 
 
 def write_html(path: Path, report: Report) -> None:
@@ -43,7 +41,7 @@ def _scores(report: Report) -> str:
     for heading, columns, legend in TABLES:
         rows, totals = object_rows(report.scores, columns), total_rows(report.scores, columns)
         parts.append(f"<h2>{escape(heading)}</h2>" if heading else "")
-        parts.append(_table(headings(columns), rows, totals) + f'<p class="legend">{escape(legend)}</p>')
+        parts.append(html_table(headings(columns), rows, totals) + f'<p class="legend">{escape(legend)}</p>')
     return "\n".join(parts)
 
 
@@ -119,35 +117,11 @@ def _conventions(report: Report) -> str:
 
 
 def _text_table(table: TextTable) -> str:
-    return _table(table.heading, table.rows, ())
-
-
-def _table(heading: Sequence[str], rows: Iterable[Sequence[str]], totals: Iterable[Sequence[str]]) -> str:
-    wraps = [name in WORDS for name in heading]
-
-    def drawn(rows: Iterable[Sequence[str]]) -> str:
-        cells = ([_cell(name, words) for name, words in zip(row, wraps, strict=True)] for row in rows)
-        return "".join(f"<tr>{''.join(row)}</tr>" for row in cells)
-
-    buttons = "".join(
-        f'<th scope="col" aria-sort="none"{" class=words" if words else ""}>'
-        f'<button type="button">{escape(name)}</button></th>'
-        for name, words in zip(heading, wraps, strict=True)
-    )
-    foot = f"<tfoot>{total}</tfoot>" if (total := drawn(totals)) else ""
-    return (
-        f'<div class="wide"><table class="sortable"><thead><tr>{buttons}</tr></thead>'
-        f"<tbody>{drawn(rows)}</tbody>{foot}</table></div>"
-    )
-
-
-def _cell(text: str, words: bool) -> str:
-    return f'<td class="words">{escape(text)}</td>' if words else f"<td>{escape(text)}</td>"
+    return html_table(table.heading, table.rows)
 
 
 def _definitions(values: Mapping[str, object]) -> str:
-    pairs = (f"<dt>{escape(k.replace('_', ' '))}</dt><dd>{escape(plain(v))}</dd>" for k, v in values.items())
-    return f"<dl>{''.join(pairs)}</dl>"
+    return definitions({name.replace("_", " "): value for name, value in values.items()})
 
 
 def _grid(*figures: str) -> str:

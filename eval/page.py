@@ -22,6 +22,7 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .55rem; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--faint);
   vertical-align: top; }
 th:first-child, td:first-child, .words { text-align: left; } tfoot td { font-weight: 600; }
+th[scope=colgroup] { text-align: center; }
 td.words { white-space: normal; min-width: 5.5rem; }
 td:first-child, th:first-child { position: sticky; left: 0; background: var(--paper); }
 th button { all: unset; cursor: pointer; font-weight: 600; } th button:focus-visible { outline: 2px solid var(--adds); }
@@ -42,7 +43,7 @@ img { width: 100%; height: auto; display: block; background: var(--faint); }
 # A click on a heading sorts the body; totals are in the foot. What is no number comes last in either direction.
 SCRIPT = """
 for (const table of document.querySelectorAll("table.sortable")) {
-  const headings = [...table.tHead.rows[0].cells];
+  const headings = [...[...table.tHead.rows].at(-1).cells];
   headings.forEach((heading, column) => heading.querySelector("button").addEventListener("click", () => {
     const sign = heading.getAttribute("aria-sort") === "ascending" ? -1 : 1;
     headings.forEach((other) => other.setAttribute("aria-sort", "none"));

@@ -12,6 +12,7 @@ import pytest
 
 import eval.__main__
 import eval.units
+from eval.ablation_table import dataset_labels
 from eval.occlusion import line, occlusion
 from eval.predict import Tracked, track_scene
 from eval.preset import read_preset, shipped_presets
@@ -46,6 +47,12 @@ axes:
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> str:
     scenes = {k: f"turn?size=160x120&frames=3&object={name}" for k, name in ((2, "tea_box"), (5, "cereal_box"))}
     return write_bop(tmp_path_factory.mktemp("tiny") / "bop", scenes)
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory: pytest.TempPathFactory) -> str:
+    scene = "turn?size=160x120&frames=3&object=tea_box&seed=3"
+    return write_bop(tmp_path_factory.mktemp("other") / "bop", {2: scene})
 
 
 @pytest.fixture
@@ -111,6 +118,7 @@ def test_finished_cells_are_kept_and_only_what_changed_is_run_again(
 
 def test_a_run_that_was_stopped_goes_on_with_the_scene_that_it_stopped_at(
     dataset: str,
+    other: str,
     ablate: Callable[..., tuple[int, str]],
     tracked_scenes: list[int],
     tmp_path: Path,
@@ -120,19 +128,27 @@ def test_a_run_that_was_stopped_goes_on_with_the_scene_that_it_stopped_at(
     preset.write_text(GRID)
     noted = eval.units.track_scene
 
-    def broken(*arguments: object) -> Tracked:
-        if len(tracked_scenes) == 5:
-            raise RuntimeError("the power is out")
-        return noted(*arguments)  # pyright: ignore[reportArgumentType]
+    def broken_after(scenes: int) -> Callable[..., Tracked]:
+        def broken(*arguments: object) -> Tracked:
+            if len(tracked_scenes) == scenes:
+                raise RuntimeError("the power is out")
+            return noted(*arguments)  # pyright: ignore[reportArgumentType]
 
-    line = (preset, "--dataset", dataset, "--out", tmp_path / "out")
-    with monkeypatch.context() as patch:
-        patch.setattr(eval.units, "track_scene", broken)
-        with pytest.raises(RuntimeError, match="the power is out"):
-            ablate(*line)
-    code, said = ablate(*line)
-    assert (code, len(tracked_scenes)) == (0, 8)
-    assert "5 of 8 scenes" in said
+        return broken
+
+    # the power goes out in the second dataset, whose first scenes are kept as those of the first are
+    for names, before, whole in (((dataset,), 5, 8), ((other, dataset), 6, 12)):
+        tracked_scenes.clear()
+        out = tmp_path / f"of {len(names)}"
+        line = (preset, *(word for name in names for word in ("--dataset", name)), "--out", out)
+        with monkeypatch.context() as patch:
+            patch.setattr(eval.units, "track_scene", broken_after(before))
+            with pytest.raises(RuntimeError, match="the power is out"):
+                ablate(*line)
+        assert not (out / "ablation.json").exists()
+        code, said = ablate(*line)
+        assert (code, len(tracked_scenes)) == (0, whole)
+        assert f"{before} of {whole} scenes" in said
 
 
 def test_the_paper_stands_beside_and_is_marked_and_a_cell_that_cannot_be_run_says_why(
@@ -152,6 +168,99 @@ def test_the_paper_stands_beside_and_is_marked_and_a_cell_that_cannot_be_run_say
     found = json.loads((out / "ablation.json").read_text())
     assert [cell["failure"] is None for cell in found["cells"]] == [True, False]
     assert "not the same data" in found["paper_is"]
+
+
+def test_several_datasets_stand_side_by_side_in_one_table_and_what_is_kept_of_one_is_used(
+    dataset: str, other: str, ablate: Callable[..., tuple[int, str]], tracked_scenes: list[int], tmp_path: Path
+) -> None:
+    preset, out = tmp_path / "grid.yaml", tmp_path / "out"
+    preset.write_text(GRID)
+    assert ablate(preset, "--dataset", dataset, "--out", out)[0] == 0
+    alone = json.loads((out / "ablation.json").read_text())
+    tracked_scenes.clear()
+    code, said = ablate(preset, "--dataset", dataset, "--dataset", other, "--out", out)
+    assert code == 0, said
+    assert tracked_scenes == [2] * 4
+    assert "8 of 12 scenes of the cells were finished before" in said
+    first, second = labels = dataset_labels([dataset, other])
+    assert first.startswith("tiny")
+    assert second.startswith("other")
+    assert said.index(first) < said.index(second)
+
+    told = json.loads((out / "ablation.json").read_text())
+    assert "cells" not in told
+    assert [(one["dataset"], one["scenes"], one["instances"]) for one in told["datasets"]] == [
+        (dataset, [2, 5], alone["instances"]), (other, [2], told["datasets"][1]["instances"])
+    ]  # fmt: skip
+    assert told["datasets"][0]["cells"] == alone["cells"]
+
+    text = (out / "ablation.md").read_text()
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
+    assert rows[0] == [f"{label}: {name}" for label in labels for name in ("ADD", "missing", "ms")]
+    assert [row[0] for row in rows[2:]] == [cell["name"] for cell in alone["cells"]]
+    for place, row in enumerate(rows[2:]):
+        pooled = [one["cells"][place]["metrics"]["pooled"] for one in told["datasets"]]
+        assert [row[1], row[4]] == [f"{one['add_auc']:.1f}" for one in pooled]
+    assert f"- {second}: {other}, scenes 2, " in text
+
+    page = (out / "ablation.html").read_text()
+    groups = "".join(f'<th scope="colgroup" colspan="3">{label}</th>' for label in labels)
+    assert f'<tr><th scope="colgroup" colspan="1"></th>{groups}</tr>' in page
+    assert f"<tr>{''.join(f'<td>{cell}</td>' for cell in rows[2])}</tr>" in page
+    assert f"<dt>{second}</dt><dd>{other}, scenes 2, " in page
+
+
+def test_one_dataset_needs_no_label_and_its_page_says_what_the_markdown_says(
+    dataset: str, ablate: Callable[..., tuple[int, str]], tmp_path: Path
+) -> None:
+    (tmp_path / "row.yaml").write_text(ROW)
+    ablate(tmp_path / "row.yaml", "--dataset", dataset, "--out", tmp_path / "out")
+    text, page = ((tmp_path / "out" / f"ablation.{ending}").read_text() for ending in ("md", "html"))
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
+    assert rows[0] == ["ADD", "(paper)"]
+    for row in rows[2:]:
+        assert "".join(f"<td>{cell}</td>" for cell in row) in page
+    assert "colgroup" not in page.partition("<body>")[2]
+    assert "/nowhere" in page.partition("Not run")[2]
+
+
+def test_the_paper_is_a_group_of_its_own_beside_several_datasets(
+    dataset: str, other: str, ablate: Callable[..., tuple[int, str]], tmp_path: Path
+) -> None:
+    (tmp_path / "row.yaml").write_text(ROW)
+    code, said = ablate(tmp_path / "row.yaml", "--dataset", dataset, "--dataset", other, "--out", tmp_path / "out")
+    first, second = dataset_labels([dataset, other])
+    assert code == 1
+    assert f"2 of 4 cells were not run: 'b' on {first}, 'b' on {second}" in said
+    rows = [line for line in (tmp_path / "out" / "ablation.md").read_text().splitlines() if line.startswith("| ")]
+    assert rows[0] == f"|  | {first}: ADD | {second}: ADD | paper: ADD |"
+    assert rows[-1] == "| b | - | - | - |"
+    assert rows[-2].endswith("| 12.3 |")
+
+
+def test_a_dataset_without_a_scene_that_is_asked_for_is_refused_before_another_one_is_tracked(
+    dataset: str, other: str, ablate: Callable[..., tuple[int, str]], tracked_scenes: list[int], tmp_path: Path
+) -> None:
+    line = ("peers", "--dataset", dataset, "--out", tmp_path / "out", "--dataset")
+    code, said = ablate(*line, other, "--scenes", "5")
+    assert (code, tracked_scenes) == (1, [])
+    assert "has no scene 5; it has 2" in said
+    code, said = ablate(*line, f"{dataset}/")
+    assert (code, tracked_scenes) == (1, [])
+    assert "--dataset: each once" in said
+
+
+@pytest.mark.parametrize(
+    ("names", "labels"),
+    [
+        (["bop:/data/hard"], [""]),
+        (["bop:/data/hard", "bop:/data/standard/"], ["hard", "standard"]),
+        (["bop:/a/test", "bop:/b/test", "bop:/c"], ["a/test", "b/test", "c"]),
+        (["bop:here", "nocs:here"], ["bop:here", "nocs:here"]),
+    ],
+)
+def test_a_label_is_the_end_of_a_name_that_tells_it_from_the_others(names: list[str], labels: list[str]) -> None:
+    assert dataset_labels(names) == labels
 
 
 @pytest.mark.parametrize(

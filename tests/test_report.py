@@ -18,6 +18,7 @@ from rich.console import Console
 from eval.environment import environment
 from eval.frame_record import FrameRecord
 from eval.html_report import write_html
+from eval.html_tables import html_table
 from eval.instances import InstanceError
 from eval.markdown_report import write_markdown
 from eval.published import PUBLISHED
@@ -260,10 +261,15 @@ const table = document.querySelector("table.sortable"), heading = table.tHead.ro
 const names = () => [...table.rows].slice(1).map((row) => row.cells[0].textContent).join(" ");
 const told = [names()];
 for (let k = 0; k < 2; k++) { heading.querySelector("button").click(); told.push(heading.ariaSort + " " + names()); }
+const grouped = [...document.querySelectorAll("table.sortable")].at(-1);
+grouped.tHead.rows[1].cells[1].querySelector("button").click();
+told.push([...grouped.tBodies[0].rows].map((row) => row.cells[0].textContent).join(" "));
 told.push([...document.images].map((image) => image.naturalWidth).join(" "));
 document.title = told.join("; ");
 </script>"""
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    below = html_table(("", "a"), [("x", "2"), ("y", "1")], groups=[("", 1), ("hard", 1)])
+    text = text.replace("\n<script>", f"{below}\n<script>", 1)
     (tmp_path / "asked.html").write_text(text.replace("</body>", f"{asked}</body>"), encoding="utf-8")
     line = (str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0")
     line += (f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", (tmp_path / "asked.html").as_uri())
@@ -271,10 +277,11 @@ document.title = told.join("; ");
     assert "CONSOLE" not in ran.stderr, ran.stderr
     (title,) = re.findall(r"<title>(.*?)</title>\n<style>", ran.stdout)
     totals = "mean of objects pooled"
-    before, ascending, descending, widths = title.split("; ")
+    before, ascending, descending, below_groups, widths = title.split("; ")
     assert before == f"o0 o1 o2 o3 {totals}"
     assert ascending == f"ascending o0 o1 o3 o2 {totals}"
     assert descending == f"descending o3 o1 o0 o2 {totals}"
+    assert below_groups == "y x"
     assert widths == "320 320 320 320"
 
 

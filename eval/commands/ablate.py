@@ -22,15 +22,16 @@ class Ablate:
     """A preset that comes along (--list), or a YAML file."""
     list_presets: Annotated[bool, tyro.conf.arg(name="list")] = False
     """Say which presets come along."""
-    dataset: str | None = None
-    """bop:PATH, ycb-video:PATH, nocs:PATH, ycbineoat:PATH or synthetic:NAME."""
+    dataset: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    """bop:PATH, ycb-video:PATH, nocs:PATH, ycbineoat:PATH or synthetic:NAME. Given several times, they stand side
+    by side in one table."""
     out: Path | None = None
-    """Folder for ablation.json and ablation.md, and for finished scenes (cells/): started again, only what is missing
-    or has changed is tracked."""
+    """Folder for ablation.json, ablation.md and ablation.html, and for finished scenes (cells/): started again, only
+    what is missing or has changed is tracked."""
     scenes: tuple[int, ...] | None = None
-    """Only these scenes."""
+    """Only these scenes; every dataset has to have them."""
     objects: tuple[str, ...] | None = None
-    """Only these objects."""
+    """Only these objects; every dataset has to have them."""
     backend: str = "attributes"
     """Saliency backend of the cells that do not say which."""
     weights: str | None = None
@@ -60,13 +61,14 @@ class Ablate:
             for name in shipped_presets():
                 STDERR.print(f"{name}: {read_preset(name).title}", highlight=False)
             return
-        if self.preset is None or self.dataset is None or self.out is None:
+        if self.preset is None or not self.dataset or self.out is None:
             raise ConfigError("eval ablate needs a PRESET (--list has them), --dataset and --out DIR")
-        self._run(read_preset(self.preset), preset_path(self.preset).parent, self.dataset, self.out)
+        self._run(read_preset(self.preset), preset_path(self.preset).parent, self.out)
 
-    def _run(self, preset: Preset, folder: Path, dataset_name: str, out: Path) -> None:
+    def _run(self, preset: Preset, folder: Path, out: Path) -> None:
         from eval.ablation import run_cells
-        from eval.ablation_report import terminal_table, write_ablation
+        from eval.ablation_report import write_ablation
+        from eval.ablation_table import dataset_labels, terminal_table
         from eval.datasets import open_dataset
         from eval.kept_units import KeptUnits
         from eval.spread import Spreading
@@ -77,9 +79,10 @@ class Ablate:
 
         if out.is_file() or (out.is_dir() and any(out.iterdir()) and not (out / "cells").is_dir()):
             raise OutputError(f"{out} holds something that is no ablation; give another folder")
+        labels = dataset_labels(self.dataset)
         spreading = Spreading(self.jobs, self.cluster)
         common = TrackRun(
-            dataset=dataset_name,
+            dataset=self.dataset[0],
             config=read_config(self.config),
             backend=self.backend,
             weights=self.weights,
@@ -90,25 +93,25 @@ class Ablate:
             object_ids=self.objects,
             threads=self.threads,
         )
-        dataset = open_dataset(dataset_name)
-        scene_ids = tuple(dataset.scene_ids if self.scenes is None else self.scenes)
+        datasets = {name: open_dataset(name) for name in self.dataset}
         kept = KeptUnits(out / "cells")
-        results = run_cells(preset, common, dataset, scene_ids, kept, folder, spreading, self.vsd, progress, progress)
-        facts: dict[str, object] = {
-            "dataset": dataset_name,
-            "scenes": list(scene_ids),
-            "instances": next((int(r.scores.pooled["instances"]) for r in results if r.scores), 0),
-            "side by side": f"{spreading.cluster or spreading.jobs} (times hold this share of the machine)",
-        }
-        failed = [result for result in results if result.failure]
+        found = run_cells(preset, common, datasets, self.scenes, kept, folder, spreading, self.vsd, progress, progress)
+        results = [result for of_dataset in found for result in of_dataset.results]
+        failed = [
+            (label, result)
+            for label, of_dataset in zip(labels, found, strict=True)
+            for result in of_dataset.results
+            if result.failure
+        ]
         if len(failed) == len(results):
-            raise ConfigError(f"no cell of {self.preset} could be run: {failed[0].failure}")
-        write_ablation(out, preset, results, facts)
-        STDERR.print(terminal_table(preset, results))
-        found, whole = sum(r.kept for r in results), sum(len(r.fingerprints) for r in results)
-        STDERR.print(f"{found} of {whole} scenes of the cells were finished before; written to {out}", highlight=False)
+            raise ConfigError(f"no cell of {self.preset} could be run: {failed[0][1].failure}")
+        where = f"{spreading.cluster or spreading.jobs} (times hold this share of the machine)"
+        write_ablation(out, preset, found, {"side by side": where})
+        STDERR.print(terminal_table(preset, found))
+        before, whole = sum(r.kept for r in results), sum(len(r.fingerprints) for r in results)
+        STDERR.print(f"{before} of {whole} scenes of the cells were finished before; written to {out}", highlight=False)
         if failed:
-            names = ", ".join(repr(result.cell.name) for result in failed)
+            names = ", ".join(f"{result.cell.name!r}{f' on {label}' if label else ''}" for label, result in failed)
             raise ConfigError(
                 f"{len(failed)} of {len(results)} cells were not run: {names}; {out}/ablation.md says why"
             )
