@@ -1,5 +1,5 @@
-"""`python -m eval track` runs the tracker on a dataset and scores it, `pairs` on pairs of images; `score` scores
-anybody's BOP result file."""
+"""`python -m eval track` runs the tracker on a dataset and scores it, `pairs` on pairs of images, `scenarios` where it
+gets lost; `score` scores anybody's BOP result file."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import tyro
 from eval.commands.ablate import Ablate
 from eval.commands.bench import Bench
 from eval.commands.pairs import Pairs
+from eval.commands.scenarios import Scenarios
 from eval.commands.score import Score
 from eval.commands.track import Track
 from tracker.terminal import run
@@ -18,7 +19,14 @@ from tracker.terminal import run
 def main() -> None:
     run(
         tyro.extras.subcommand_cli_from_dict(
-            {"track": Track, "score": Score, "pairs": Pairs, "ablate": Ablate, "bench": Bench},
+            {
+                "track": Track,
+                "score": Score,
+                "pairs": Pairs,
+                "scenarios": Scenarios,
+                "ablate": Ablate,
+                "bench": Bench,
+            },
             prog="python -m eval",
             args=sys.argv[1:],
         )

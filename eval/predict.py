@@ -24,6 +24,7 @@ from reference.vocabulary import VocabularySet
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError, OnboardingError
+from tracker.first_masks import FirstMasks
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.result import TrackResult, TrackState
@@ -62,6 +63,10 @@ class Protocol:
             raise ConfigError(f"--views: at least one reference frame is needed, got {self.views}")
         if self.concepts is not None and self.concepts < 1:
             raise ConfigError(f"--concepts: at least one concept is needed, got {self.concepts}")
+        if self.config.masks == "carried" and self.method != "ours":
+            raise ConfigError(
+                f"method {self.method} is given the masks of every frame: --masks carried is of no use to it"
+            )
         start = method_kind(self.method).start
         if start == "needed" and self.initialisation != "gt":
             raise ConfigError(f"method {self.method} goes on from a pose that it is told: it needs --init gt")
@@ -146,6 +151,7 @@ def track_scene(
         return tracked
     tracker = open_method(protocol.method, models, protocol.config, protocol.backend)
     truth, visible = _truth(source, [model.object_id for model in models])
+    first_masks = FirstMasks()
     untold = [model.object_id for model in models] if protocol.initialisation == "gt" else []
     shown = viewer(models)
     try:
@@ -153,7 +159,8 @@ def track_scene(
             for object_id in [o for o in untold if (frame.index, o) in visible]:
                 tracker.place(object_id, truth[frame.index][object_id], frame.stamp_ns)
                 untold.remove(object_id)
-            results = tracker.step(frame)
+            given = frame if protocol.config.masks == "given" else first_masks(frame)
+            results = tracker.step(given)
             shown.show(frame, results, truth[frame.index])
             seen = [(frame.index, result.object_id) in visible for result in results]
             _record(tracked, dataset, scene_id, frame.index, results, seen, protocol)

@@ -52,16 +52,20 @@ def reliability(
     kept = [(r, key) for r, key in kept if key in confidences]
     if not kept:
         return None
-    stated = np.array([confidences[key] for _, key in kept])
-    right = np.array([is_right(r) for r, _ in kept])
+    return reliability_of([confidences[key] for _, key in kept], [is_right(r) for r, _ in kept], bins)
+
+
+def reliability_of(confidences: Sequence[float], right: Sequence[bool], bins: int = BINS) -> Reliability:
+    """Of poses with a confidence in [0, 1] each, one at least, and whether each is right."""
+    stated, true = np.array(confidences, np.float64), np.array(right, bool)
     place = np.clip((stated * bins + 1e-9).astype(int), 0, bins - 1)  # 0.3 * 10 is a hair under 3
     found = []
     for k in range(bins):
         inside = place == k
         count = int(inside.sum())
-        means = (float(stated[inside].mean()), float(right[inside].mean())) if count else (np.nan, np.nan)
+        means = (float(stated[inside].mean()), float(true[inside].mean())) if count else (np.nan, np.nan)
         found.append(ConfidenceBin(k / bins, (k + 1) / bins, count, *means))
-    error = sum(b.count * abs(b.right - b.confidence) for b in found if b.count) / len(kept)
+    error = sum(b.count * abs(b.right - b.confidence) for b in found if b.count) / len(stated)
     return Reliability(tuple(found), float(error))
 
 

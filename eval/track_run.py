@@ -25,6 +25,7 @@ DECIDE = ("tracker", "reference", "eval/datasets", "eval/peers", "eval/predict.p
 MASKS = {
     "visib": "the dataset's visible masks",
     "full": "the dataset's full masks: whole silhouettes, with the pixels of whatever hides the object",
+    "carried": "carried by the tracker from the dataset's first visible mask of each object and scene",
 }
 
 

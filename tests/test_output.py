@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tracker.confidence import Grounds
 from tracker.errors import OutputError, SourceError
 from tracker.geometry import Pose
 from tracker.output import as_json_line, require_free, result_folder
@@ -115,7 +116,7 @@ TRACKED = TrackResult(
     covariance=COVARIANCE,
     reason="found by search",
     raw_pose=Pose.identity(),
-    evidence=Evidence(*[0.123456] * len(fields(Evidence))),
+    grounds=Grounds(Evidence(*[0.123456] * len(fields(Evidence))), 0.01, 0.02, 0.03),
     timings_ms={"view": 1.23456, "total": 20.0},
 )
 LOST = TrackResult(33, "mug", None, TrackState.LOST, 0.0, None, "out of view", None, None, {"total": 0.5})

@@ -94,7 +94,7 @@ def test_an_object_is_followed_to_millimetres_and_degrees(
         assert 0.1 < result.confidence <= 1
         assert (result.stamp_ns, result.object_id) == (frame.stamp_ns, it.object_id)
         assert result.raw_pose is result.pose
-        assert (result.covariance, result.evidence) == (None, None)
+        assert (result.covariance, result.grounds) == (None, None)
         assert result.timings_ms["total"] > 0
 
 

@@ -312,7 +312,7 @@ def _distances_m(mesh: Mesh, points_m: npt.NDArray[np.floating]) -> npt.NDArray[
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_nothing_stands_inside_something_else(name: str, seed: int) -> None:
-    layout = SCENES[name].build(seed, SCENES[name].hero)
+    layout = SCENES[name].build(seed, SCENES[name].hero(seed))
     time_s = 1.0
     placed = [(p.thing.name, p.thing.mesh.moved(p.at(time_s))) for p in (*layout.tracked, *layout.surroundings)]
     for object_id in (p.thing.name for p in layout.tracked):

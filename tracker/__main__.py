@@ -31,8 +31,10 @@ class Track:
     """Where the backend runs; auto is CUDA where there is one."""
     locate: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CONCEPT"), tyro.conf.UseAppendAction] = ()
     """Say in every line where this concept of the object is; once for every concept."""
-    masks: Literal["given"] = "given"
-    """Where the object's pixels come from: given by the source."""
+    masks: Literal["given", "carried"] | None = None
+    """Where the object's pixels come from: given by the source in every frame, or carried on by the tracker from the
+    first that is given; where none is, it looks for the object in the whole picture. Default: as the config says
+    (given)."""
     prior: Literal["on", "off"] | None = None
     """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
     config: Path | None = None
@@ -48,8 +50,9 @@ class Track:
 
     def __call__(self) -> None:
         from tracker.concept import ConceptModel
-        from tracker.config import dump_config, read_config
+        from tracker.config import dump_config, parse_config, read_config
         from tracker.errors import ConfigError, TrackerError
+        from tracker.first_masks import FirstMasks
         from tracker.output import as_json_line, result_folder
         from tracker.pipeline import ObjectTracker
         from tracker.saliency import BackendOptions, open_backend
@@ -61,6 +64,8 @@ class Track:
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
+        if self.masks is not None:
+            config = parse_config({**config.model_dump(), "masks": self.masks}, f"--masks {self.masks}")
         if not self.model:
             raise ConfigError("--model: at least one concept model is needed; python -m reference makes one")
         models = [ConceptModel.load(path) for path in self.model]
@@ -68,7 +73,7 @@ class Track:
         tracker = ObjectTracker(models, config, backend)
         regions = {model.object_id: {c: model.locate(c, backend) for c in self.locate} for model in models}
         source = open_source(self.source)
-        summary = _Summary()
+        summary, first_masks = _Summary(), FirstMasks()
         failure: TrackerError | None = None
         with ExitStack() as stack:
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
@@ -80,7 +85,7 @@ class Track:
             frames = iter(source) if self.quiet or self.json else progress(source, len(source), "tracking")
             try:
                 for frame in frames:
-                    results = tracker.step(frame)
+                    results = tracker.step(frame if config.masks == "given" else first_masks(frame))
                     viewer.show(frame, results, {})
                     for result in results:
                         summary.add(result.object_id, result.state.value, result.timings_ms["total"])

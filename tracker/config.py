@@ -3,40 +3,50 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Self
 
 import torch
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from tracker.closest_points import ClosestPointsConfig
 from tracker.cloud import CloudConfig
 from tracker.errors import ConfigError
 from tracker.matching import MatchingConfig
 from tracker.pose_filter import FilterConfig
+from tracker.proposals import ProposalConfig
 from tracker.refinement import RefinementConfig
 from tracker.registration import RegistrationConfig
 from tracker.saliency.device import torch_device
+from tracker.silhouette import SilhouetteConfig
 from tracker.verification import VerificationConfig
 from tracker.view import ViewConfig
 
 
 class TrackerConfig(BaseModel):
     """prior: start from the predicted pose and search globally only where that fails; False makes every frame
-    independent, as in the paper. accept: confidence under which no pose is reported. trust: confidence at which a
-    pose found from the prediction is taken without a global search. jump: by how much a pose found elsewhere has to be
-    better than that: objects seldom jump, and may show a side that the model does not know. verified: candidates that
-    are refined. seed: of the sampling. device: of matching and registration, "auto" is CUDA where there is one."""
+    independent, as in the paper. believe: confidence under which no pose is reported. accept, trust: score of the
+    evidence (`tracker.verification.Evidence`) from which a pose found from the prediction is preferred to others unless
+    they are better by `jump`, as objects seldom jump and may show a side that the model does not know, and from which
+    no other is looked for. verified: candidates that are refined. seed: of the sampling. device: of matching and
+    registration, "auto" is CUDA where there is one.
+    masks: "given" by every frame, or "carried" on by the tracker itself from the first one on, which a frame's mask
+    overrules. regain: confidence at which, where masks are carried, a lost object is believed to be seen again.
+    search_every: frames between searches of the whole picture for it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     prior: bool = True
+    believe: float = Field(default=0.1, ge=0, le=1)
     accept: float = Field(default=0.25, ge=0, le=1)
     trust: float = Field(default=0.6, ge=0, le=1)
     jump: float = Field(default=0.1, ge=0, le=1)
     verified: int = Field(default=5, ge=1, le=64)
     seed: int = 42
     device: str = "auto"
+    masks: Literal["given", "carried"] = "given"
+    regain: float = Field(default=0.5, ge=0, le=1)
+    search_every: int = Field(default=3, ge=1)
     view: ViewConfig = ViewConfig()
     cloud: CloudConfig = CloudConfig()
     matching: MatchingConfig = MatchingConfig()
@@ -44,7 +54,15 @@ class TrackerConfig(BaseModel):
     verification: VerificationConfig = VerificationConfig()
     closest_points: ClosestPointsConfig = ClosestPointsConfig()
     refinement: RefinementConfig = RefinementConfig()
+    silhouette: SilhouetteConfig = SilhouetteConfig()
+    proposals: ProposalConfig = ProposalConfig()
     filter: FilterConfig = FilterConfig()
+
+    @model_validator(mode="after")
+    def _carried_by_a_prior(self) -> Self:
+        if self.masks == "carried" and not self.prior:
+            raise ValueError("masks are carried from frame to frame: masks=carried needs prior=true")
+        return self
 
     @property
     def torch_device(self) -> torch.device:

@@ -1,28 +1,20 @@
-"""The tracker. The method on one page: `ObjectTracker.step` and `_Track.step`."""
+"""The tracker: all objects of a camera, frame by frame. What is done for each is on the page of `Track.step`."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from tracker.cloud import LEAST_POINTS, lift
+from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError, FrameError
 from tracker.frame import Frame
 from tracker.geometry import Pose
-from tracker.pose_filter import PoseFilter
-from tracker.result import Surface, TrackResult, TrackState
+from tracker.result import TrackResult
 from tracker.saliency import Query, Saliency, SaliencyBackend, open_backend
-from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
-from tracker.view import ObjectView, view_object
-
-logger = logging.getLogger(__name__)
-
-PLACED_SIGMA_RAD, PLACED_SIGMA_M = 0.1, 0.01  # how surely an object is where `place` says
+from tracker.track import Track
+from tracker.view import ObjectView
 
 
 class ObjectTracker:
@@ -48,7 +40,8 @@ class ObjectTracker:
         for model in models:
             model.require_backend(backend)
         self._backend = backend
-        self._tracks = [_Track(model, config) for model in models]
+        self._tracks = [Track(model, config) for model in models]
+        self._camera = CameraMotion()
         self._prior, self._last_stamp_ns, self._placed_ns = config.prior, -1, -1
 
     def place(self, object_id: str, T_cam_obj: Pose, stamp_ns: int) -> None:
@@ -80,119 +73,26 @@ class ObjectTracker:
                 f"{what}, {before} ns"
             )
         self._last_stamp_ns = frame.stamp_ns
+        self._camera.advance(frame)
         clocks = [Stopwatch() for _ in self._tracks]
+        steps = [track.step(frame, self._camera, clock) for track, clock in zip(self._tracks, clocks, strict=True)]
+        results: dict[int, TrackResult] = {}
 
-        # What does the frame show of each object, and where are its concepts? One batch for all objects.
-        views = [track.view(frame, clock) for track, clock in zip(self._tracks, clocks, strict=True)]
-        saliency = self._saliency(views, clocks)
+        # Every object's step asks for the concepts of what it looks at, until it has a result. One batch answers all.
+        answers: dict[int, Saliency | None] = dict.fromkeys(range(len(steps)))
+        while answers:
+            asked: dict[int, ObjectView] = {}
+            for k, saliency in answers.items():
+                try:
+                    asked[k] = steps[k].send(saliency)  # pyright: ignore[reportArgumentType]: None starts a generator
+                except StopIteration as ended:
+                    results[k] = ended.value
+            answers = self._saliency(asked, clocks)
+        return tuple(results[k] for k in range(len(steps)))
 
-        # Where is each object?
-        return tuple(
-            track.step(frame, view, maps, clock)
-            for track, view, maps, clock in zip(self._tracks, views, saliency, clocks, strict=True)
-        )
-
-    def _saliency(self, views: Sequence[ObjectView | str], clocks: Sequence[Stopwatch]) -> list[Saliency | None]:
-        """Of every view that there is."""
-        queries = {
-            k: Query(view, self._tracks[k].labels) for k, view in enumerate(views) if isinstance(view, ObjectView)
-        }
-        found: dict[int, Saliency] = {}
-        if queries:
-            with Stopwatch.shared([clocks[k] for k in queries], "saliency"):
-                found = dict(zip(queries, self._backend(list(queries.values())), strict=True))
-        return [found.get(k) for k in range(len(views))]
-
-
-class _Track:
-    """One object's stages and its state between frames."""
-
-    def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
-        self._model, self._config = model, config
-        self._search = Search(model, config)
-        self._filter = PoseFilter(config.filter)
-        self._state = TrackState.INITIALISING
-
-    @property
-    def object_id(self) -> str:
-        return self._model.object_id
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        return self._model.labels
-
-    def place(self, T_cam_obj: Pose, stamp_ns: int) -> None:
-        information = np.diag([PLACED_SIGMA_RAD**-2] * 3 + [PLACED_SIGMA_M**-2] * 3)
-        self._filter.start(T_cam_obj, information, stamp_ns)
-
-    def view(self, frame: Frame, clock: Stopwatch) -> ObjectView | str:
-        """What the frame shows of the object, or the reason why it shows nothing."""
-        mask = frame.masks.get(self._model.object_id)
-        if mask is None:
-            return f"no mask of object {self._model.object_id!r} was given"
-        if not mask.any():
-            return "out of view: the mask is empty"
-        with clock("view"):
-            view = view_object(frame, mask, self._model.diameter_m, self._config.view)
-        return "no depth within the mask" if view is None else view
-
-    def step(self, frame: Frame, view: ObjectView | str, saliency: Saliency | None, clock: Stopwatch) -> TrackResult:
-        # 1. Which points of the object does the frame show, and what is each of them?
-        if isinstance(view, str) or saliency is None:
-            return self._lost(frame, str(view), clock)
-        with clock("cloud"):
-            sight = Sight.of(view, lift(view, saliency, self._config.cloud))
-        if len(sight.cloud) < LEAST_POINTS:
-            few = f"too little to see: {len(sight.cloud)} usable points, {LEAST_POINTS} are needed"
-            return self._lost(frame, few, clock)
-
-        # 2. Which pose explains them, at best near the expected one?
-        predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
-        found = self._search(sight, predicted, clock)
-        if found is None or found.evidence.score < self._config.accept:
-            score = found.evidence.score if found else 0.0
-            return self._lost(frame, f"poor fit: the best pose explains {score:.2f} of what should be seen", clock)
-
-        # 3. What does that say about its pose, given where it has been?
-        return self._tracked(frame, found, predicted, view, clock)
-
-    def _tracked(
-        self, frame: Frame, found: Hypothesis, predicted: Pose | None, view: ObjectView, clock: Stopwatch
-    ) -> TrackResult:
-        with clock("filter"):
-            refined = found.refined if predicted is None else found.refined.nearest(predicted, self._model.symmetry)
-            raw, information = refined.T_cam_obj, refined.information
-            filtered = self._filter.update(raw, information, frame.stamp_ns) if self._config.prior else None
-            if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
-                filtered = self._filter.start(raw, information, frame.stamp_ns)
-        self._state = TrackState.TRACKING
-        return TrackResult(
-            stamp_ns=frame.stamp_ns,
-            object_id=self._model.object_id,
-            pose=filtered.T_cam_obj,
-            state=self._state,
-            confidence=found.evidence.score,
-            covariance=filtered.covariance,
-            reason=f"found by {found.origin}",
-            raw_pose=raw,
-            evidence=found.evidence,
-            timings_ms=clock.timings_ms(),
-            surface=Surface(self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera),
-        )
-
-    def _lost(self, frame: Frame, reason: str, clock: Stopwatch) -> TrackResult:
-        if self._state is TrackState.TRACKING:
-            logger.info("object %r lost at frame %d: %s", self._model.object_id, frame.index, reason)
-            self._state = TrackState.LOST
-        return TrackResult(
-            stamp_ns=frame.stamp_ns,
-            object_id=self._model.object_id,
-            pose=None,
-            state=self._state,
-            confidence=0.0,
-            covariance=None,
-            reason=reason,
-            raw_pose=None,
-            evidence=None,
-            timings_ms=clock.timings_ms(),
-        )
+    def _saliency(self, views: Mapping[int, ObjectView], clocks: Sequence[Stopwatch]) -> dict[int, Saliency | None]:
+        if not views:
+            return {}
+        queries = [Query(view, self._tracks[k].labels) for k, view in views.items()]
+        with Stopwatch.shared([clocks[k] for k in views], "saliency"):
+            return dict(zip(views, self._backend(queries), strict=True))

@@ -8,6 +8,7 @@ from enum import Enum
 import numpy as np
 
 from tracker.concept import ConceptModel
+from tracker.confidence import Grounds
 from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.projection import nearest_pixels, project
 from tracker.region import Region, SeenRegion
@@ -45,11 +46,11 @@ class Surface:
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackResult:
     """stamp_ns, object_id: of which frame and object. pose: T_cam_obj after the filter, None unless TRACKING.
-    state: see TrackState. confidence: in [0, 1], the share of the model's surface that should be seen and is, in place
-    and in colour; 0 without a pose. covariance: (6, 6) of `pose`, of (turn, radians; shift, metres) in camera axes
-    about the object's origin. reason: why there is no pose, or how it came about. raw_pose: T_cam_obj of this frame
-    alone, before the filter. evidence: what the confidence was judged by. timings_ms: stage -> milliseconds.
-    surface: what was seen of the object, None without a pose."""
+    state: see TrackState. confidence: in [0, 1], how likely the pose is right, see `tracker.confidence`; 0 without one.
+    covariance: (6, 6) of `pose`, of (turn, radians; shift, metres) in camera axes about the object's origin. reason:
+    why there is no pose, or how it came about. raw_pose: T_cam_obj of this frame alone, before the filter. grounds:
+    what the confidence was judged by. timings_ms: stage -> milliseconds. surface: what was seen of the object, None
+    without a pose."""
 
     stamp_ns: int
     object_id: str
@@ -59,9 +60,14 @@ class TrackResult:
     covariance: Floats | None
     reason: str
     raw_pose: Pose | None
-    evidence: Evidence | None
+    grounds: Grounds | None
     timings_ms: dict[str, float]
     surface: Surface | None = None
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """What the picture says of the pose, None without one."""
+        return None if self.grounds is None else self.grounds.evidence
 
     def locate(self, concept: str | Region) -> SeenRegion | None:
         """Where a concept of the object is in this frame. None without a pose, or where the object does not have it.

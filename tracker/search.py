@@ -44,7 +44,7 @@ class Hypothesis:
 
 
 class Search:
-    """Finds one object in what frames show of it. It remembers nothing from frame to frame."""
+    """Finds one object in what frames show of it, each by itself."""
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
@@ -53,23 +53,18 @@ class Search:
         self._closest = ClosestPoints(model, config.closest_points)
         self._refine = Refiner(model, config.refinement, config.view.pixels_across)
         self._verify = Verifier(model, config.verification, config.view.pixels_across)
+        self._matched: tuple[Sight, Correspondences] | None = None
 
     def __call__(self, sight: Sight, predicted: Pose | None, clock: Stopwatch) -> Hypothesis | None:
-        """The pose that explains best what is seen; None where none does at all."""
-        # Which of the cloud's points is which point of the model?
-        with clock("matching"):
-            correspondences = self._match(sight.cloud)
-
-        # Is it where it was expected? If not clearly so: where do the correspondences agree that it is?
-        found = None if predicted is None else self._near(predicted, sight, correspondences, clock)
+        """The pose that explains best what is seen, anywhere where none is clearly near a prediction; or None."""
+        found = None if predicted is None else self.near(predicted, sight, clock)
         if found is None or found.evidence.score < self._config.trust:
-            found = preferred(found, self._anywhere(sight, correspondences, clock), self._config)
+            found = preferred(found, self.anywhere(sight, clock), self._config)
         return found
 
-    def _near(
-        self, predicted: Pose, sight: Sight, correspondences: Correspondences, clock: Stopwatch
-    ) -> Hypothesis | None:
+    def near(self, predicted: Pose, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
         """The better of two poses near the prediction: by surfaces alone, and pulled by the concepts first."""
+        correspondences = self._correspondences(sight, clock)
         with clock("closest points"):
             pulled = self._closest.align(self._closest.pull(predicted, correspondences, sight.cloud), sight.cloud)
             direct = self._closest.align(predicted, sight.cloud)
@@ -78,12 +73,25 @@ class Search:
             return found
         return better(self._refined(direct, sight, "prediction", clock), found)
 
+    def judged(self, found: Hypothesis, view: ObjectView) -> Hypothesis:
+        """The same pose with the evidence of another view of the same frame."""
+        evidence = self._verify(found.refined.T_cam_obj, view, view_appearance(view))
+        return Hypothesis(found.refined, evidence, found.origin)
+
+    def _correspondences(self, sight: Sight, clock: Stopwatch) -> Correspondences:
+        """Which of the cloud's points is which point of the model? Of the last sight they are kept."""
+        if self._matched is None or self._matched[0] is not sight:
+            with clock("matching"):
+                self._matched = (sight, self._match(sight.cloud))
+        return self._matched[1]
+
     def _alike(self, a: Pose, b: Pose) -> bool:
         """So near that refinement brings them to the same pose."""
         return a.angle_to_rad(b) < 0.03 and a.distance_to_m(b) < 0.01 * self._model.diameter_m
 
-    def _anywhere(self, sight: Sight, correspondences: Correspondences, clock: Stopwatch) -> Hypothesis | None:
+    def anywhere(self, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
         """The best of the poses on which correspondences agree, wherever that is."""
+        correspondences = self._correspondences(sight, clock)
         with clock("registration"):
             generator = torch.Generator(self._device).manual_seed(self._config.seed)
             candidates = register(correspondences, sight.cloud, self._model, self._config.registration, generator)

@@ -46,10 +46,13 @@ class Evidence:
     outside: float
     hidden: float
     explained: float
+    proved: float
 
 
-NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 UNKNOWN, LEAST_EXPLAINED = 0.5, 0.3
+NO_LIGHT = np.array((-16.0, 0.0, 0.0))  # in Lab, where the cube root would be straight on to 0
+GAIN_RANGE, GAIN_SIGMA, OFFSET_SIGMA = (0.5, 2.0), 0.7, 25.0  # of Lab colours
 CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
 
 
@@ -61,6 +64,7 @@ class Verifier:
         chosen = np.random.default_rng(0).permutation(len(model))[: config.model_points]
         self._points, self._normals = model.points[chosen], model.normals[chosen]
         self._lab = model_appearance(model, pixels_across).lab[0][chosen]
+        self._most = _most_shown(self._normals)
         self._sigma_m = max(config.depth_sigma * model.diameter_m, config.depth_sigma_least_m)
 
     def __call__(self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance) -> Evidence:
@@ -95,16 +99,24 @@ class Verifier:
             outside=float((weights * ~on_object).sum() / total),
             hidden=float((at.facing * hidden).sum() / (at.facing * faces).sum()),
             explained=explained,
+            proved=float(weights[in_place].sum() / self._most),
         )
 
     def _colour_agreement(self, lab: np.ndarray, in_place: np.ndarray) -> np.ndarray:
-        """(N,) in [0, 1]; an offset that all points share (exposure, white balance) is taken off and costs a little."""
+        """(N,) in [0, 1]; brightness and an offset that all points share (white balance) are taken off, at a small cost.
+
+        Lab is a cube root of light: light that is k times as bright makes (L + 16, a, b) cbrt(k) times as large.
+        """
         if in_place.sum() < 20:
             return np.zeros(len(lab))
-        offset = np.median((lab - self._lab)[in_place], axis=0)
-        difference = np.linalg.norm((lab - self._lab - offset) * (0.6, 1, 1), axis=1)
+        gain = np.median((lab[:, 0] - NO_LIGHT[0])[in_place] / (self._lab[:, 0] - NO_LIGHT[0])[in_place])
+        gain = float(np.clip(gain, *GAIN_RANGE))
+        expected = gain * (self._lab - NO_LIGHT) + NO_LIGHT
+        offset = np.median((lab - expected)[in_place], axis=0)
+        difference = np.linalg.norm((lab - expected - offset) * (0.6, 1, 1), axis=1)
         drift = np.linalg.norm(offset * (0.3, 1, 1))
-        return np.exp(-0.5 * (difference / self._config.lab_sigma) ** 2 - 0.5 * (drift / 25) ** 2)
+        unlike = (np.log(gain) / GAIN_SIGMA) ** 2 + (drift / OFFSET_SIGMA) ** 2
+        return np.exp(-0.5 * (difference / self._config.lab_sigma) ** 2 - 0.5 * unlike)
 
 
 def worth(explained: float) -> float:
@@ -134,3 +146,11 @@ def _frame_depth_m(points_cam: np.ndarray, view: ObjectView) -> np.ndarray:
     inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
     clipped = (np.where(inside, rows, 0).astype(np.intp), np.where(inside, columns, 0).astype(np.intp))
     return np.where(inside, view.frame.depth_m[clipped], 0.0)
+
+
+def _most_shown(normals: np.ndarray) -> float:
+    """The largest weight of points (N, 3) that face a camera from any direction."""
+    directions = np.random.default_rng(0).normal(size=(200, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    cosines = normals @ directions.T
+    return float(np.where(cosines > 0.2, cosines, 0).sum(axis=0).max())

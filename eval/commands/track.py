@@ -44,9 +44,9 @@ class Track:
     """Only the first so many of them. Default: all."""
     views: int = 2
     """Reference frames an object and scene; they are not scored."""
-    masks: Literal["visib", "full"] = "visib"
-    """Where the object's pixels come from: the dataset's masks of what can be seen, or those of the whole silhouette,
-    also where something hides it (BOP's mask/)."""
+    masks: Literal["visib", "full", "carried"] = "visib"
+    """Where the object's pixels come from: the dataset's masks of what can be seen; those of the whole silhouette, also
+    where something hides it (BOP's mask/); or its first visible one alone, which the tracker carries on by itself."""
     prior: Literal["on", "off"] | None = None
     """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
     poses: Literal["filtered", "raw"] = "filtered"
@@ -145,11 +145,13 @@ class Track:
     def _run(self) -> TrackRun:
         from eval.track_run import TrackRun
         from reference.vocabulary import read_vocabulary
-        from tracker.config import read_config
+        from tracker.config import parse_config, read_config
 
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
+        if self.masks == "carried":
+            config = parse_config({**config.model_dump(), "masks": "carried"}, "--masks carried")
         return TrackRun(
             dataset=self.dataset,
             config=config,

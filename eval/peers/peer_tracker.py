@@ -83,6 +83,6 @@ class PeerTracker:
             covariance=None,
             reason=found if isinstance(found, str) else "found",
             raw_pose=pose,
-            evidence=None,
+            grounds=None,
             timings_ms=clock.timings_ms(),
         )

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tracker.geometry import Floats, Pose
 
 Motion = Callable[[float], Pose]
+RATE_HZ = 30.0  # of the frames
 
 
 def upright(x_m: float, y_m: float, yaw_deg: float, half_height_m: float, base_m: float = 0.0) -> Pose:

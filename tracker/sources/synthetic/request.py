@@ -76,17 +76,18 @@ def read_request(argument: str) -> Request:
         raise SourceError(f"synthetic:{argument}: there is no scene {scene!r}; there is {known}")
     kind = SCENES[scene]
     given = _options(argument, query)
-    if "object" in given and not kind.hero:
+    if "object" in given and not kind.heroes:
         raise SourceError(f"synthetic:{argument}: scene {scene!r} has all objects, so option 'object' says nothing")
     width, height = given.get("size", (640, 480))
+    seed = given.get("seed", 0)
     return Request(
         scene=scene,
         frames=given.get("frames", kind.frames),
-        seed=given.get("seed", 0),
+        seed=seed,
         width=width,
         height=height,
         noise=given.get("noise", 1.0),
-        hero=given.get("object", kind.hero),
+        hero=given.get("object", kind.hero(seed)),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from tracker.frame import Frame, Provenance
 from tracker.geometry import Intrinsics, Pose
 from tracker.sources import Sighting, require_object
+from tracker.sources.synthetic.motion import RATE_HZ
 from tracker.sources.synthetic.rendering.picture import Rendering, render
 from tracker.sources.synthetic.rendering.world import World
 from tracker.sources.synthetic.request import Request
@@ -18,7 +19,6 @@ from tracker.sources.synthetic.sensor import developed, exposure, measured_depth
 from tracker.sources.synthetic.things.objects import ObjectShape, shape_of
 from tracker.sources.synthetic.visibility import VisibilityCounter
 
-RATE_HZ = 30.0
 FOCAL_PX = 600.0  # at a width of 640
 SHUTTER = 0.2  # share of the time between frames for which the shutter is open
 
@@ -53,7 +53,7 @@ class SyntheticScene:
         noise, seed = self._request.noise, self._request.seed
         rng = np.random.default_rng([seed, index])
         gains = exposure(seed, index, noise)
-        return Frame(
+        frame = Frame(
             rgb=developed(ideal.radiance, gains, self._motion_px(index), noise, rng),
             depth_m=measured_depth_m(ideal, noise, rng),
             intrinsics=self.intrinsics,
@@ -62,6 +62,7 @@ class SyntheticScene:
             index=index,
             provenance=Provenance(self.name, "synthetic"),
         )
+        return self._layout.fault(frame)
 
     def camera(self, index: int) -> Intrinsics:  # noqa: ARG002
         """The same in every frame."""

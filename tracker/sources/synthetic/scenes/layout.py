@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.sources.synthetic.motion import Motion, lying, upright
 from tracker.sources.synthetic.rendering.world import Placed
 from tracker.sources.synthetic.things.thing import Thing
 
 
+def faultless(frame: Frame) -> Frame:
+    return frame
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """A scene before it is built. tracked: the objects with known poses. T_world_cam: fixed, or a motion."""
+    """A scene before it is built. tracked: the objects with known poses. T_world_cam: fixed, or a motion. fault: what
+    goes wrong with a frame after the sensor has taken it."""
 
     tracked: Sequence[Placed]
     surroundings: Sequence[Placed]
     T_world_cam: Pose | Motion
+    fault: Callable[[Frame], Frame] = faultless
 
 
 def stand(thing: Thing, x_m: float, y_m: float, yaw_deg: float, base_m: float = 0.0) -> Placed:

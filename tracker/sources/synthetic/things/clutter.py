@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tracker.geometry import Pose
-from tracker.sources.synthetic.things.drawing import Picture, Rgb, Sheet
+from tracker.sources.synthetic.things.drawing import Picture, Rgb, Sheet, grained
 from tracker.sources.synthetic.things.mesh import joined
 from tracker.sources.synthetic.things.motifs import INK, PAPER, barcode, small_print, star
 from tracker.sources.synthetic.things.solids import Strip, box, revolved, swept
@@ -31,7 +31,7 @@ def parcel(width_mm: float, depth_mm: float, height_mm: float) -> Thing:
     top.rectangle(0, depth_mm / 2 - 24, width_mm, 48, (200, 172, 120))
     top.rectangle(0, depth_mm / 2 - 0.6, width_mm, 1.2, (140, 106, 70))
     sheets = {"front": front, "side": side, "top": top}
-    texture, w = pack({name: glossy(_grained(sheet.finished, 4), 0.05) for name, sheet in sheets.items()})
+    texture, w = pack({name: glossy(grained(sheet.finished, 4), 0.05) for name, sheet in sheets.items()})
     windows: dict[str, Window] = dict.fromkeys(("right", "left", "back"), w["side"])
     windows |= {"front": w["front"], "top": w["top"], "bottom": w["side"]}
     return Thing("parcel", box([width_mm / 1000, depth_mm / 1000, height_mm / 1000], windows), texture)
@@ -53,7 +53,7 @@ def fruit(kind: str) -> Thing:
         streak = 5.0 if kind == "apple" else 0.4
         skin.line([(x, y), (x + 0.3, y + streak)], (214, 120, 50) if kind == "apple" else (214, 112, 16), 0.5)
     stalk = np.stack((np.linspace(0, 0.004, 8), np.zeros(8), np.linspace(0.016, 0.036, 8)), axis=1)
-    texture, w = pack({"skin": glossy(_grained(skin.finished, 5), 0.45), "stalk": plain((88, 62, 34), 0.1)})
+    texture, w = pack({"skin": glossy(grained(skin.finished, 5), 0.45), "stalk": plain((88, 62, 34), 0.1)})
     points = [(abs(float(r)), float(z)) for r, z in zip(radius.round(6), height, strict=True)]
     bodies = [revolved([Strip(points, w["skin"])], 48)]
     if kind == "apple":
@@ -148,10 +148,3 @@ def _pencil(colour: Rgb) -> Picture:
     sheet.rectangle(0, 12, 10, 18, (222, 184, 132))
     sheet.rectangle(0, 29, 10, 11, INK)
     return sheet.finished
-
-
-def _grained(picture: Picture, strength: float) -> Picture:
-    """With the unevenness of a natural surface."""
-    rng = np.random.default_rng(1)
-    grain = rng.normal(0, strength, picture.shape[:2])[..., None]
-    return (picture + grain).clip(0, 255).astype(np.uint8)

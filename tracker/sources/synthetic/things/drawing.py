@@ -112,3 +112,10 @@ class Sheet:
 
     def _px(self, points_mm: Points) -> npt.NDArray[np.int32]:
         return np.round(np.asarray(points_mm, float) * self._scale).astype(np.int32)
+
+
+def grained(picture: Picture, strength: float) -> Picture:
+    """With the unevenness of a natural surface."""
+    rng = np.random.default_rng(1)
+    grain = rng.normal(0, strength, picture.shape[:2])[..., None]
+    return (picture + grain).clip(0, 255).astype(np.uint8)

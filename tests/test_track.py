@@ -1,0 +1,125 @@
+"""The carried mask: pointed out once, an object is followed, known to be lost, and found again; never made up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference.onboard import onboard, read_reference_frames
+from tracker.concept import ConceptModel
+from tracker.config import TrackerConfig
+from tracker.first_masks import FirstMasks
+from tracker.frame import Frame
+from tracker.geometry import Pose
+from tracker.pipeline import ObjectTracker
+from tracker.result import TrackResult, TrackState
+from tracker.saliency import SaliencyBackend
+from tracker.sources.synthetic import SyntheticScene, open_scene
+
+CARRIED = TrackerConfig(masks="carried")
+CAN = "soup_can"
+
+
+def bare(frame: Frame) -> Frame:
+    """Without masks."""
+    return replace(frame, masks={})
+
+
+def carried(model: ConceptModel, frames: Iterable[Frame]) -> list[TrackResult]:
+    """Pointed out in the first frame where it can be seen, and never again."""
+    tracker, first = ObjectTracker(model, CARRIED), FirstMasks()
+    return [tracker.step(first(frame))[0] for frame in frames]
+
+
+def assert_near(pose: Pose | None, truth: Pose) -> None:
+    assert pose is not None
+    assert pose.distance_to_m(truth) < 0.004
+    assert np.degrees(pose.angle_to_rad(truth)) < 4
+
+
+def test_a_can_is_followed_by_its_first_mask_alone(
+    can_scene: SyntheticScene, can_model: ConceptModel, can_frames: list[Frame]
+) -> None:
+    for frame, result in zip(can_frames, carried(can_model, can_frames), strict=True):
+        assert result.state is TrackState.TRACKING, result.reason
+        assert_near(result.pose, can_scene.sightings(CAN)[frame.index].T_cam_obj)
+
+
+@pytest.fixture(scope="module")
+def leaving() -> SyntheticScene:
+    """A parcel hides the can; later the camera turns away and comes back."""
+    return open_scene("leave?size=320x240")
+
+
+@pytest.fixture(scope="module")
+def left(leaving: SyntheticScene, attributes: SaliencyBackend) -> list[TrackResult]:
+    return carried(onboard(read_reference_frames(leaving, CAN, 3), attributes), leaving)
+
+
+def test_there_is_no_pose_of_what_is_hidden_or_out_of_view(leaving: SyntheticScene, left: list[TrackResult]) -> None:
+    seen = {s.index for s in leaving.sightings(CAN) if s.visible_px > 0}
+    false_tracks = [r for k, r in enumerate(left) if k not in seen and r.pose is not None]
+    assert len(seen) < len(left) - 20
+    assert len(false_tracks) <= 3
+    for k, result in enumerate(left):
+        assert (result.pose is None) == (result.state is not TrackState.TRACKING), k
+
+
+def test_what_was_hidden_and_what_was_out_of_view_is_found_again(
+    leaving: SyntheticScene, left: list[TrackResult]
+) -> None:
+    truths = {s.index: s for s in leaving.sightings(CAN)}
+    shown = [k for k, s in truths.items() if s.visible_fraction > 0.9]
+    tracking = [k for k in shown if left[k].state is TrackState.TRACKING]
+    assert len(tracking) > 0.85 * len(shown)
+    assert left[-1].state is TrackState.TRACKING
+    for k in tracking:
+        pose = left[k].pose
+        assert pose is not None
+        assert pose.distance_to_m(truths[k].T_cam_obj) < 0.01
+
+
+def test_one_that_was_taken_away_is_lost_and_says_so(can_model: ConceptModel, can_frames: list[Frame]) -> None:
+    gone = []
+    for frame in can_frames[2:6]:
+        mask = frame.masks[CAN]
+        depth_m = np.where(mask, np.float32(frame.depth_m[~mask].max()), frame.depth_m)
+        gone.append(
+            bare(replace(frame, depth_m=depth_m, rgb=np.where(mask[:, :, None], 90, frame.rgb).astype(np.uint8)))
+        )
+    results = carried(can_model, [*can_frames[:2], *gone])
+    assert [r.state for r in results[:2]] == [TrackState.TRACKING] * 2
+    for result in results[2:]:
+        assert result.state is TrackState.LOST
+        assert result.pose is None
+        assert result.reason
+
+
+def test_without_any_mask_it_is_found_in_the_whole_picture_and_confirmed_by_a_second_frame(
+    can_scene: SyntheticScene, can_model: ConceptModel, can_frames: list[Frame]
+) -> None:
+    tracker = ObjectTracker(can_model, CARRIED)
+    results = [tracker.step(bare(frame))[0] for frame in can_frames[:8]]
+    first = next(k for k, r in enumerate(results) if r.state is TrackState.TRACKING)
+    assert first >= 1
+    assert "confirm" in results[first - 1].reason
+    assert results[first - 1].state is TrackState.INITIALISING
+    assert_near(results[first].pose, can_scene.sightings(CAN)[can_frames[first].index].T_cam_obj)
+
+
+def test_a_mask_that_a_frame_gives_overrules_what_is_carried(can_model: ConceptModel, can_frames: list[Frame]) -> None:
+    tracker = ObjectTracker(can_model, CARRIED)
+    assert tracker.step(can_frames[0])[0].state is TrackState.TRACKING
+    nothing = replace(can_frames[1], masks={CAN: np.zeros_like(can_frames[1].masks[CAN])})
+    said = tracker.step(nothing)[0]
+    assert (said.pose, said.state) == (None, TrackState.LOST)
+    assert "out of view" in said.reason
+    assert tracker.step(can_frames[2])[0].state is TrackState.TRACKING
+
+
+def test_masks_are_carried_by_a_prior() -> None:
+    with pytest.raises(ValueError, match="masks=carried needs prior=true"):
+        TrackerConfig(masks="carried", prior=False)

@@ -1,0 +1,66 @@
+"""How likely a pose is right, within 2 cm and 10 degrees, by what speaks for it.
+
+A logistic model of a handful of measures, each of them without a unit, so that it holds for a cup and for a cereal box.
+Its weights were fitted to rendered scenes alone (`python -m eval calibrate`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.geometry import Floats
+from tracker.refinement import Refined
+from tracker.symmetry import Symmetry
+from tracker.verification import Evidence
+
+MEASURES = ("colour", "turn_sigma", "shift", "turn", "not_expected", "constant")
+WEIGHTS = np.array([1.28, -1.27, -0.12, -0.90, 2.82, -9.89])
+LEAST_INFORMATION = 1e-6  # of a direction that the data leave free
+LEAST = 0.02  # a share, an angle or a way nearer to 0 than this says no more than this
+
+
+@dataclass(frozen=True, slots=True)
+class Grounds:
+    """What speaks for a pose. evidence: of the picture. turn_sigma_rad: standard deviation of its rotation, by the
+    information that refinement had. shift, turn_rad: how far it is from the nearest pose that was expected, as a share
+    of the diameter and an angle modulo the symmetry; None where none was."""
+
+    evidence: Evidence
+    turn_sigma_rad: float
+    shift: float | None = None
+    turn_rad: float | None = None
+
+    def measures(self) -> Floats:
+        """(M,) what the confidence is a function of: in the order of `MEASURES`."""
+        expected = self.shift is not None and self.turn_rad is not None
+        return np.array(
+            [
+                _log_odds(self.evidence.colour),
+                np.log(np.clip(self.turn_sigma_rad, 1e-4, 1.0)),
+                np.log(LEAST + self.shift) if expected else 0.0,
+                np.log(LEAST + self.turn_rad) if expected else 0.0,
+                0.0 if expected else 1.0,
+                1.0,
+            ]
+        )
+
+
+def turn_sigma_rad(refined: Refined, symmetry: Symmetry) -> float:
+    """Standard deviation of the rotation, without that about the axis of a solid of revolution, which is nobody's."""
+    covariance = np.linalg.inv(refined.information + LEAST_INFORMATION * np.eye(6))[:3, :3]
+    if symmetry.axis is not None:
+        axis_cam = refined.T_cam_obj.rotation @ symmetry.axis
+        covariance = covariance - np.outer(axis_cam, axis_cam) * (axis_cam @ covariance @ axis_cam)
+    return float(np.sqrt(max(np.trace(covariance), 0.0)))
+
+
+def confidence(grounds: Grounds) -> float:
+    """In [0, 1]."""
+    return float(1 / (1 + np.exp(-grounds.measures() @ WEIGHTS)))
+
+
+def _log_odds(share: float) -> float:
+    share = float(np.clip(share, LEAST, 1 - LEAST))
+    return float(np.log(share / (1 - share)))

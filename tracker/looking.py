@@ -1,0 +1,125 @@
+"""Looking for one object at one place in a frame, or at several, until it is found."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeVar
+
+from tracker.cloud import LEAST_POINTS, lift
+from tracker.concept import ConceptModel
+from tracker.confidence import Grounds, confidence, turn_sigma_rad
+from tracker.config import TrackerConfig
+from tracker.frame import Frame, Mask
+from tracker.geometry import Pose
+from tracker.saliency import Saliency
+from tracker.search import Hypothesis, Search, Sight
+from tracker.silhouette import Silhouette
+from tracker.stopwatch import Stopwatch
+from tracker.view import ObjectView, view_object
+
+T = TypeVar("T")
+Asking = Generator[ObjectView, Saliency, T]  # asks for the saliency of a view, as often as it takes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. alone:
+    not for any other, even where it is not clearly there. expected: all poses that the object was expected at."""
+
+    mask: Mask
+    start: Pose | None
+    expected: Sequence[Pose] = ()
+    alone: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A pose, the pixels that it was judged by, and what speaks for it."""
+
+    hypothesis: Hypothesis
+    view: ObjectView
+    grounds: Grounds
+
+    @property
+    def score(self) -> float:
+        return self.hypothesis.evidence.score
+
+    @cached_property
+    def confidence(self) -> float:
+        return confidence(self.grounds)
+
+
+class Looking:
+    """For one model."""
+
+    def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
+        self._model, self._config = model, config
+        self._search = Search(model, config)
+        self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
+
+    def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
+        """The best of what the looks find, no further than the first that leaves no doubt; or why there is nothing."""
+        best: Found | str = "nothing in the picture looks like it"
+        for look in looks:
+            seen = look if isinstance(look, str) else (yield from self._seen(look, frame, clock))
+            if isinstance(best, str) or (not isinstance(seen, str) and self._better(seen, best)):
+                best = seen
+            if not isinstance(best, str) and best.score >= self._config.trust:
+                break
+        return best
+
+    def outline(self, T_cam_obj: Pose, frame: Frame, clock: Stopwatch) -> Mask | str:
+        """Where an object shows that is about at this pose, or why it does not."""
+        with clock("mask"):
+            return self._silhouette(T_cam_obj, frame, known=False)
+
+    def _better(self, seen: Found, best: Found) -> bool:
+        """Objects seldom jump: what is found anywhere has to be clearly better than what is found where expected."""
+        jumps = seen.hypothesis.origin == "search" != best.hypothesis.origin and best.score >= self._config.accept
+        return seen.score > best.score + (self._config.jump if jumps else 0.0)
+
+    def _seen(self, look: Look, frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
+        with clock("view"):
+            view = view_object(frame, look.mask, self._model.diameter_m, self._config.view)
+        if view is None:
+            return "no depth within the mask"
+        saliency = yield view
+        with clock("cloud"):
+            sight = Sight.of(view, lift(view, saliency, self._config.cloud))
+        if len(sight.cloud) < LEAST_POINTS:
+            return f"too little to see: {len(sight.cloud)} usable points, {LEAST_POINTS} are needed"
+        if look.alone and look.start is not None:
+            hypothesis = self._search.near(look.start, sight, clock)
+        else:
+            hypothesis = self._search(sight, look.start, clock)
+        if hypothesis is None:
+            return "poor fit: no pose explains what is seen"
+        found = Found(hypothesis, view, self._grounds(hypothesis, look.expected))
+        return self._outlined(found, frame, clock) if self._config.masks == "carried" else found
+
+    def _outlined(self, found: Found, frame: Frame, clock: Stopwatch) -> Found | str:
+        """The same pose, judged by the pixels that it says are the object's, and by those around them that lie on: a
+        thing ends where its outline does, a wall or a table goes on."""
+        with clock("mask"):
+            mask = self._silhouette(found.hypothesis.refined.T_cam_obj, frame, known=True)
+        if isinstance(mask, str):
+            return mask
+        with clock("view"):
+            view = view_object(frame, mask, self._model.diameter_m, self._config.view)
+        if view is None:
+            return "no depth where it should be"
+        with clock("verification"):
+            judged = self._search.judged(found.hypothesis, view)
+        return Found(judged, view, replace(found.grounds, evidence=judged.evidence))
+
+    def _grounds(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> Grounds:
+        refined, symmetry = hypothesis.refined, self._model.symmetry
+        grounds = Grounds(hypothesis.evidence, turn_sigma_rad(refined, symmetry))
+        if not expected:
+            return grounds
+        pose = refined.T_cam_obj
+        nearest = min(expected, key=pose.distance_to_m)
+        shift = pose.distance_to_m(nearest) / self._model.diameter_m
+        return replace(grounds, shift=shift, turn_rad=symmetry.nearest(pose, nearest).angle_to_rad(nearest))

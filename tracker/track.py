@@ -1,0 +1,186 @@
+"""One object from frame to frame: where to look for it, and whether what is found there is believed."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Iterator
+from typing import TypeGuard
+
+import numpy as np
+
+from tracker.camera_motion import CameraMotion
+from tracker.concept import ConceptModel
+from tracker.config import TrackerConfig
+from tracker.frame import Frame
+from tracker.geometry import Pose
+from tracker.looking import Asking, Found, Look, Looking
+from tracker.pose_filter import PoseFilter
+from tracker.proposals import Proposals
+from tracker.result import Surface, TrackResult, TrackState
+from tracker.stopwatch import Stopwatch
+
+logger = logging.getLogger(__name__)
+
+PLACED_SIGMA_RAD, PLACED_SIGMA_M = 0.1, 0.01  # how surely an object is where `place` says
+SAME_RAD, SAME_SHARE = 0.05, 0.03  # poses nearer than this angle and share of the diameter are looked at once
+
+
+class Track:
+    """One object's stages, and what is remembered of it between frames."""
+
+    def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
+        self._model, self._config = model, config
+        self._look = Looking(model, config)
+        self._proposals = Proposals(model, config.proposals, config.matching, config.torch_device)
+        self._filter = PoseFilter(config.filter)
+        self._state = TrackState.INITIALISING
+        # In the camera coordinates of the last frame: where it was believed to be last, and where it may be seen again.
+        self._last: Pose | None = None
+        self._suspected: Pose | None = None
+        self._frames_lost = 0
+
+    @property
+    def object_id(self) -> str:
+        return self._model.object_id
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return self._model.labels
+
+    def place(self, T_cam_obj: Pose, stamp_ns: int) -> None:
+        information = np.diag([PLACED_SIGMA_RAD**-2] * 3 + [PLACED_SIGMA_M**-2] * 3)
+        self._filter.start(T_cam_obj, information, stamp_ns)
+        self._last = T_cam_obj
+
+    def step(self, frame: Frame, camera: CameraMotion, clock: Stopwatch) -> Asking[TrackResult]:
+        # 1. Is it where it is said, or expected, to be?
+        found = yield from self._look.best(self._looks(frame, camera, clock), frame, clock)
+
+        # 2. If not, is it anywhere in the picture? That takes a second frame to be believed.
+        if self._carried and not self._believed(found, frame) and self._search_due(frame):
+            elsewhere = yield from self._anywhere(frame, clock)
+            if self._believed(elsewhere, frame, anywhere=True):
+                self._carry(camera, elsewhere.hypothesis.refined.T_cam_obj)
+                return self._lost(frame, "seen again: the next frame has to confirm it", clock)
+
+        # 3. What does that say about its pose, given where it has been?
+        if self._believed(found, frame):
+            return self._tracked(frame, found, clock)
+        self._carry(camera, None)
+        reason = found if isinstance(found, str) else f"poor fit: the best pose is right at {found.confidence:.0%}"
+        return self._lost(frame, reason, clock)
+
+    def _carry(self, camera: CameraMotion, suspected: Pose | None) -> None:
+        """Take where it was along with the camera, and where it may be, until it is found."""
+        self._suspected = suspected
+        if self._carried and self._last is not None and (moved := camera.from_last()):
+            self._last = moved @ self._last
+
+    @property
+    def _carried(self) -> bool:
+        return self._config.masks == "carried"
+
+    def _looks(self, frame: Frame, camera: CameraMotion, clock: Stopwatch) -> Iterator[Look | str]:
+        """Where to look, one after the other until it is found; or why nowhere."""
+        predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
+        mask = frame.masks.get(self._model.object_id)
+        if mask is not None:
+            expected = () if predicted is None else (predicted,)
+            yield Look(mask, predicted, expected) if mask.any() else "out of view: the mask is empty"
+        elif not self._carried:
+            yield f"no mask of object {self._model.object_id!r} was given"
+        elif self._last is None and self._suspected is None:
+            yield "not seen yet"
+        else:
+            yield from self._where_it_may_be(self._expected(predicted, camera), frame, clock)
+
+    def _where_it_may_be(self, expected: Iterable[Pose], frame: Frame, clock: Stopwatch) -> Iterator[Look | str]:
+        """Near each pose; if it is clearly at none of them, anywhere around the first."""
+        near: list[Pose] = []
+        looked: list[Look] = []
+        for pose in expected:
+            if not any(self._same(pose, other) for other in near):
+                near.append(pose)
+                outline = self._look.outline(pose, frame, clock)
+                if isinstance(outline, str):
+                    yield outline
+                else:
+                    looked.append(Look(outline, pose, tuple(near), alone=True))
+                    yield looked[-1]
+        if looked:
+            yield Look(looked[0].mask, None, tuple(near))
+
+    def _expected(self, predicted: Pose | None, camera: CameraMotion) -> Iterator[Pose]:
+        """Where it is if it moves on as it did; where it is if it stands still and the camera moved."""
+        if predicted is not None and self._state is TrackState.TRACKING:
+            yield predicted
+        for last in (self._suspected, self._last):
+            if last is not None:
+                moved = camera.from_last()
+                yield last if moved is None else moved @ last
+
+    def _same(self, a: Pose, b: Pose) -> bool:
+        return a.angle_to_rad(b) < SAME_RAD and a.distance_to_m(b) < SAME_SHARE * self._model.diameter_m
+
+    def _anywhere(self, frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
+        picture = self._proposals.picture(frame)
+        if picture is None:
+            return "no depth in the whole picture"
+        saliency = yield picture
+        with clock("proposals"):
+            masks = self._proposals.masks(picture, saliency, self._config.cloud)
+        return (yield from self._look.best((Look(mask, None) for mask in masks), frame, clock))
+
+    def _believed(self, found: Found | str, frame: Frame, *, anywhere: bool = False) -> TypeGuard[Found]:
+        """Less is asked of what is being tracked, or pointed out, than of what is seen again: so a state does not
+        flicker, and a look-alike is not the object."""
+        if isinstance(found, str):
+            return False
+        known = self._state is TrackState.TRACKING or self._model.object_id in frame.masks or not self._carried
+        return found.confidence >= (self._config.believe if known and not anywhere else self._config.regain)
+
+    def _search_due(self, frame: Frame) -> bool:
+        return self._model.object_id not in frame.masks and self._frames_lost % self._config.search_every == 0
+
+    def _tracked(self, frame: Frame, found: Found, clock: Stopwatch) -> TrackResult:
+        with clock("filter"):
+            predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
+            refined = found.hypothesis.refined
+            refined = refined if predicted is None else refined.nearest(predicted, self._model.symmetry)
+            raw, information = refined.T_cam_obj, refined.information
+            filtered = self._filter.update(raw, information, frame.stamp_ns) if self._config.prior else None
+            if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
+                filtered = self._filter.start(raw, information, frame.stamp_ns)
+        self._state, self._last, self._suspected, self._frames_lost = TrackState.TRACKING, raw, None, 0
+        view = found.view
+        return TrackResult(
+            stamp_ns=frame.stamp_ns,
+            object_id=self._model.object_id,
+            pose=filtered.T_cam_obj,
+            state=self._state,
+            confidence=found.confidence,
+            covariance=filtered.covariance,
+            reason=f"found by {found.hypothesis.origin}",
+            raw_pose=raw,
+            grounds=found.grounds,
+            timings_ms=clock.timings_ms(),
+            surface=Surface(self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera),
+        )
+
+    def _lost(self, frame: Frame, reason: str, clock: Stopwatch) -> TrackResult:
+        self._frames_lost += 1
+        if self._state is TrackState.TRACKING:
+            logger.info("object %r lost at frame %d: %s", self._model.object_id, frame.index, reason)
+            self._state = TrackState.LOST
+        return TrackResult(
+            stamp_ns=frame.stamp_ns,
+            object_id=self._model.object_id,
+            pose=None,
+            state=self._state,
+            confidence=0.0,
+            covariance=None,
+            reason=reason,
+            raw_pose=None,
+            grounds=None,
+            timings_ms=clock.timings_ms(),
+        )
