@@ -13,10 +13,13 @@ import cv2
 import pytest
 
 import eval.__main__
+import eval.scenarios.run
 import reference.__main__
 import tracker.__main__
 import tracker.sources
 from eval.bop_results import read_results
+from eval.scenarios.frame_log import FrameLog
+from eval.scenarios.run import RunLog, ScenarioRun
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig, read_config
 from tracker.declared_symmetry import parse_symmetry
@@ -548,3 +551,45 @@ def test_eval_pairs_refuses_what_it_cannot_do_and_leaves_no_folder(
     Path("broken.csv").write_text("scene,image,pose\n")
     assert_refused(run("eval", "pairs", "--dataset", SOURCE, *options, "--out", "out"), *words)
     assert set(content(tmp_path)) == {"broken.csv"}
+
+
+def test_eval_scenarios_prints_a_table_and_writes_every_frame(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = FrameLog(0, 1.0, True, False, "tracking", 0.8, "", 0.002, 3.0)
+    asked: list[ScenarioRun] = []
+
+    def tracked(each: ScenarioRun) -> RunLog:
+        asked.append(each)
+        return RunLog(each.scenario, each.seed, "mug", [seen] * 4)
+
+    monkeypatch.setattr(eval.scenarios.run, "run_scenario", tracked)
+    out = tmp_path / "runs.json"
+    line = ("eval", "scenarios", "away", "hand", "--seeds", 2, "--first-seed", 3, "--size", "64x64", "--json", out)
+    said = run(*line)
+    assert (said.code, said.out) == (0, ""), said.err
+    assert [(each.scenario, each.seed) for each in asked] == [("away", 3), ("away", 4), ("hand", 3), ("hand", 4)]
+    assert {(each.size, each.views, each.config.masks) for each in asked} == {("64x64", 4, "carried")}
+    for word in ("away", "100%", "AUROC", "calibration", "rendering"):
+        assert word in said.err
+    content = json.loads(out.read_text())
+    assert [len(each["frames"]) for each in content["runs"]] == [4] * 4
+    assert content["protocol"]["seeds"] == [3, 4]
+    assert_refused(run(*line), "runs.json", "--overwrite")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("kitchen",), ("'kitchen'", "hidden, away, hand, jerk, lights, blind, swapped")),
+        (("--seeds", 0), ("--seeds", "0")),
+        (("--first-seed", -1), ("--first-seed", "-1")),
+        (("--views", 0), ("--views", "0")),
+        (("--size", "big"), ("'big'", "WIDTHxHEIGHT")),
+        (("--config", "absent.yaml"), ("absent.yaml",)),
+    ],
+)
+def test_eval_scenarios_refuses_what_it_does_not_know(
+    options: tuple[object, ...], words: tuple[str, ...], run: Run
+) -> None:
+    assert_refused(run("eval", "scenarios", *options), *words)

@@ -45,7 +45,7 @@ class TrackerConfig(BaseModel):
     seed: int = 42
     device: str = "auto"
     masks: Literal["given", "carried"] = "given"
-    regain: float = Field(default=0.5, ge=0, le=1)
+    regain: float = Field(default=0.3, ge=0, le=1)
     search_every: int = Field(default=3, ge=1)
     view: ViewConfig = ViewConfig()
     cloud: CloudConfig = CloudConfig()

@@ -26,20 +26,21 @@ Asking = Generator[ObjectView, Saliency, T]  # asks for the saliency of a view, 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
     """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. alone:
-    not for any other, even where it is not clearly there. expected: all poses that the object was expected at."""
+    not for any other, even where it is not clearly there. masked: the pixels are known to be the object's. expected:
+    all poses that the object was expected at."""
 
     mask: Mask
     start: Pose | None
     expected: Sequence[Pose] = ()
     alone: bool = False
+    masked: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A pose, the pixels that it was judged by, and what speaks for it."""
+    """A pose, and what speaks for it."""
 
     hypothesis: Hypothesis
-    view: ObjectView
     grounds: Grounds
 
     @property
@@ -87,7 +88,7 @@ class Looking:
             return "no depth within the mask"
         saliency = yield view
         with clock("cloud"):
-            sight = Sight.of(view, lift(view, saliency, self._config.cloud))
+            sight = Sight.of(view, lift(view, saliency, self._config.cloud), masked=look.masked)
         if len(sight.cloud) < LEAST_POINTS:
             return f"too little to see: {len(sight.cloud)} usable points, {LEAST_POINTS} are needed"
         if look.alone and look.start is not None:
@@ -96,23 +97,7 @@ class Looking:
             hypothesis = self._search(sight, look.start, clock)
         if hypothesis is None:
             return "poor fit: no pose explains what is seen"
-        found = Found(hypothesis, view, self._grounds(hypothesis, look.expected))
-        return self._outlined(found, frame, clock) if self._config.masks == "carried" else found
-
-    def _outlined(self, found: Found, frame: Frame, clock: Stopwatch) -> Found | str:
-        """The same pose, judged by the pixels that it says are the object's, and by those around them that lie on: a
-        thing ends where its outline does, a wall or a table goes on."""
-        with clock("mask"):
-            mask = self._silhouette(found.hypothesis.refined.T_cam_obj, frame, known=True)
-        if isinstance(mask, str):
-            return mask
-        with clock("view"):
-            view = view_object(frame, mask, self._model.diameter_m, self._config.view)
-        if view is None:
-            return "no depth where it should be"
-        with clock("verification"):
-            judged = self._search.judged(found.hypothesis, view)
-        return Found(judged, view, replace(found.grounds, evidence=judged.evidence))
+        return Found(hypothesis, self._grounds(hypothesis, look.expected))
 
     def _grounds(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> Grounds:
         refined, symmetry = hypothesis.refined, self._model.symmetry

@@ -70,20 +70,10 @@ class Proposals:
         centres = centres[np.linspace(0, len(centres) - 1, min(len(centres), 500)).astype(int)]
         around = tree.query_ball_point(centres, self._diameter_m / 2)
         worth = np.array([votes[near].sum() for near in around])
-        return [self._around(centre, picture.frame) for centre in self._apart(centres, worth)]
+        return [self.around(centre, picture.frame) for centre in self._apart(centres, worth)]
 
-    def _apart(self, centres: Floats, worth: Floats) -> list[Floats]:
-        """The worthiest places, none within half a diameter of a worthier one."""
-        chosen: list[Floats] = []
-        for k in np.argsort(-worth, kind="stable"):
-            if all(np.linalg.norm(centres[k] - other) > self._diameter_m / 2 for other in chosen):
-                chosen.append(centres[k])
-            if len(chosen) == self._config.places:
-                break
-        return chosen
-
-    def _around(self, centre: Floats, frame: Frame) -> Mask:
-        """(H, W) bool, pixels whose points lie within the radius of a place."""
+    def around(self, centre: Floats, frame: Frame) -> Mask:
+        """(H, W) bool, pixels whose points lie within the radius of a place (3,), metres, camera coordinates."""
         camera, radius_m = frame.intrinsics, self._config.radius * self._diameter_m
         reach_px = radius_m * camera.fx / max(centre[2] - radius_m, 0.1)
         column, row = centre[0] / centre[2] * camera.fx + camera.cx, centre[1] / centre[2] * camera.fy + camera.cy
@@ -96,3 +86,13 @@ class Proposals:
         mask = np.zeros(frame.depth_m.shape, bool)
         mask[y0:y1, x0:x1] = near & (depth_m > 0)
         return mask
+
+    def _apart(self, centres: Floats, worth: Floats) -> list[Floats]:
+        """The worthiest places, none within half a diameter of a worthier one."""
+        chosen: list[Floats] = []
+        for k in np.argsort(-worth, kind="stable"):
+            if all(np.linalg.norm(centres[k] - other) > self._diameter_m / 2 for other in chosen):
+                chosen.append(centres[k])
+            if len(chosen) == self._config.places:
+                break
+        return chosen

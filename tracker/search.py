@@ -16,31 +16,35 @@ from tracker.geometry import Pose
 from tracker.matching import Correspondences, Matcher
 from tracker.refinement import Refined, Refiner
 from tracker.registration import Candidate, register
+from tracker.silhouette import Silhouette
 from tracker.stopwatch import Stopwatch
 from tracker.verification import Evidence, Verifier
-from tracker.view import ObjectView
+from tracker.view import ObjectView, view_object
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sight:
-    """What one frame shows of an object."""
+    """What one frame shows of an object, and maybe of what is around it. masked: all of it is known to be of it."""
 
     view: ObjectView
     cloud: PointCloud
     appearance: ViewAppearance
+    masked: bool
 
     @classmethod
-    def of(cls, view: ObjectView, cloud: PointCloud) -> Sight:
-        return cls(view, cloud, view_appearance(view))
+    def of(cls, view: ObjectView, cloud: PointCloud, *, masked: bool = True) -> Sight:
+        return cls(view, cloud, view_appearance(view), masked)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction or search."""
+    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction or search. view: the
+    pixels by which it was judged."""
 
     refined: Refined
     evidence: Evidence
     origin: str
+    view: ObjectView
 
 
 class Search:
@@ -53,6 +57,7 @@ class Search:
         self._closest = ClosestPoints(model, config.closest_points)
         self._refine = Refiner(model, config.refinement, config.view.pixels_across)
         self._verify = Verifier(model, config.verification, config.view.pixels_across)
+        self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
         self._matched: tuple[Sight, Correspondences] | None = None
 
     def __call__(self, sight: Sight, predicted: Pose | None, clock: Stopwatch) -> Hypothesis | None:
@@ -73,11 +78,6 @@ class Search:
             return found
         return better(self._refined(direct, sight, "prediction", clock), found)
 
-    def judged(self, found: Hypothesis, view: ObjectView) -> Hypothesis:
-        """The same pose with the evidence of another view of the same frame."""
-        evidence = self._verify(found.refined.T_cam_obj, view, view_appearance(view))
-        return Hypothesis(found.refined, evidence, found.origin)
-
     def _correspondences(self, sight: Sight, clock: Stopwatch) -> Correspondences:
         """Which of the cloud's points is which point of the model? Of the last sight they are kept."""
         if self._matched is None or self._matched[0] is not sight:
@@ -97,10 +97,9 @@ class Search:
             candidates = register(correspondences, sight.cloud, self._model, self._config.registration, generator)
             candidates = self._inequivalent(candidates)
         with clock("verification"):
-            rough = [(self._verify(c.T_cam_obj, sight.view, sight.appearance).score, c) for c in candidates]
-            rough.sort(key=lambda scored: -scored[0])
+            candidates.sort(key=lambda candidate: -self._roughly(candidate.T_cam_obj, sight))
         best = None
-        for _, candidate in rough[: self._config.verified]:
+        for candidate in candidates[: self._config.verified]:
             with clock("closest points"):
                 closer = self._closest.align(candidate.T_cam_obj, sight.cloud)
             best = better(best, self._refined(closer, sight, "search", clock))
@@ -120,7 +119,28 @@ class Search:
         if refined is None:
             return None
         with clock("verification"):
-            return Hypothesis(refined, self._verify(refined.T_cam_obj, sight.view, sight.appearance), origin)
+            return self._judged(refined, sight, origin)
+
+    def _roughly(self, T_cam_obj: Pose, sight: Sight) -> float:
+        evidence = self._verify(T_cam_obj, sight.view, sight.appearance)
+        return evidence.score if sight.masked else evidence.of_itself
+
+    def _judged(self, refined: Refined, sight: Sight, origin: str) -> Hypothesis | None:
+        """By the object's pixels. Where nobody knows them, by those that the pose itself says are the object's, and
+        those around them that lie on: a thing ends where its outline does, a wall or a table goes on. None where none
+        are."""
+        view, appearance = sight.view, sight.appearance
+        if not sight.masked:
+            mask = self._silhouette(refined.T_cam_obj, view.frame, known=True)
+            own = (
+                None
+                if isinstance(mask, str)
+                else view_object(view.frame, mask, self._model.diameter_m, self._config.view)
+            )
+            if own is None:
+                return None
+            view, appearance = own, view_appearance(own)
+        return Hypothesis(refined, self._verify(refined.T_cam_obj, view, appearance), origin, view)
 
 
 def preferred(expected: Hypothesis | None, elsewhere: Hypothesis | None, config: TrackerConfig) -> Hypothesis | None:

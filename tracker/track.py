@@ -12,7 +12,7 @@ from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import Frame
-from tracker.geometry import Pose
+from tracker.geometry import Floats, Pose
 from tracker.looking import Asking, Found, Look, Looking
 from tracker.pose_filter import PoseFilter
 from tracker.proposals import Proposals
@@ -23,6 +23,8 @@ logger = logging.getLogger(__name__)
 
 PLACED_SIGMA_RAD, PLACED_SIGMA_M = 0.1, 0.01  # how surely an object is where `place` says
 SAME_RAD, SAME_SHARE = 0.05, 0.03  # poses nearer than this angle and share of the diameter are looked at once
+
+LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
 
 
 class Track:
@@ -37,6 +39,7 @@ class Track:
         # In the camera coordinates of the last frame: where it was believed to be last, and where it may be seen again.
         self._last: Pose | None = None
         self._suspected: Pose | None = None
+        self._pointed_out_m: Floats | None = None  # and where it was said to be, but could not be told
         self._frames_lost = 0
 
     @property
@@ -67,14 +70,28 @@ class Track:
         if self._believed(found, frame):
             return self._tracked(frame, found, clock)
         self._carry(camera, None)
+        self._keep_in_mind(frame)
         reason = found if isinstance(found, str) else f"poor fit: the best pose is right at {found.confidence:.0%}"
         return self._lost(frame, reason, clock)
 
     def _carry(self, camera: CameraMotion, suspected: Pose | None) -> None:
         """Take where it was along with the camera, and where it may be, until it is found."""
         self._suspected = suspected
-        if self._carried and self._last is not None and (moved := camera.from_last()):
-            self._last = moved @ self._last
+        if (
+            not self._carried
+            or (self._last is None and self._pointed_out_m is None)
+            or not (moved := camera.from_last())
+        ):
+            return
+        self._last = None if self._last is None else moved @ self._last
+        self._pointed_out_m = None if self._pointed_out_m is None else (moved @ self._pointed_out_m[None])[0]
+
+    def _keep_in_mind(self, frame: Frame) -> None:
+        """Where a mask says that it is, though it cannot be told there yet."""
+        mask = frame.masks.get(self._model.object_id)
+        if mask is not None and (shown := np.argwhere(mask & (frame.depth_m > 0))).size:
+            points = frame.intrinsics.unproject(shown[:, 1], shown[:, 0], frame.depth_m[*shown.T].astype(np.float64))
+            self._pointed_out_m = np.median(points, axis=0)
 
     @property
     def _carried(self) -> bool:
@@ -86,11 +103,14 @@ class Track:
         mask = frame.masks.get(self._model.object_id)
         if mask is not None:
             expected = () if predicted is None else (predicted,)
-            yield Look(mask, predicted, expected) if mask.any() else "out of view: the mask is empty"
+            yield Look(mask, predicted, expected, masked=True) if mask.any() else "out of view: the mask is empty"
         elif not self._carried:
             yield f"no mask of object {self._model.object_id!r} was given"
         elif self._last is None and self._suspected is None:
-            yield "not seen yet"
+            if self._pointed_out_m is None:
+                yield "not seen yet"
+            else:
+                yield Look(self._proposals.around(self._pointed_out_m, frame), None)
         else:
             yield from self._where_it_may_be(self._expected(predicted, camera), frame, clock)
 
@@ -134,7 +154,7 @@ class Track:
     def _believed(self, found: Found | str, frame: Frame, *, anywhere: bool = False) -> TypeGuard[Found]:
         """Less is asked of what is being tracked, or pointed out, than of what is seen again: so a state does not
         flicker, and a look-alike is not the object."""
-        if isinstance(found, str):
+        if isinstance(found, str) or found.hypothesis.evidence.surface < LEAST_SURFACE:
             return False
         known = self._state is TrackState.TRACKING or self._model.object_id in frame.masks or not self._carried
         return found.confidence >= (self._config.believe if known and not anywhere else self._config.regain)
@@ -152,7 +172,8 @@ class Track:
             if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
                 filtered = self._filter.start(raw, information, frame.stamp_ns)
         self._state, self._last, self._suspected, self._frames_lost = TrackState.TRACKING, raw, None, 0
-        view = found.view
+        self._pointed_out_m = None
+        view = found.hypothesis.view
         return TrackResult(
             stamp_ns=frame.stamp_ns,
             object_id=self._model.object_id,

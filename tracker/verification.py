@@ -37,7 +37,8 @@ class Evidence:
     surface: the same in place alone. colour: agreement of the colours where the place agrees.
     seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
     outside the mask. hidden: share of the camera-facing model that something in front hides. explained: share of the
-    object's measured pixels on which a part of the model lies in place."""
+    object's measured pixels on which a part of the model lies in place. proved: how much of the model's surface is in
+    place, as a share of the most that it can show at once."""
 
     score: float
     surface: float
@@ -47,6 +48,12 @@ class Evidence:
     hidden: float
     explained: float
     proved: float
+
+    @property
+    def of_itself(self) -> float:
+        """In [0, 1], what speaks for a pose where nobody knows which pixels are the object's: how much of the model is
+        in place and in colour, and how little of what should be is not."""
+        return self.score / max(worth(self.explained), 1e-9) * float(np.sqrt(self.proved))
 
 
 NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
@@ -103,7 +110,7 @@ class Verifier:
         )
 
     def _colour_agreement(self, lab: np.ndarray, in_place: np.ndarray) -> np.ndarray:
-        """(N,) in [0, 1]; brightness and an offset that all points share (white balance) are taken off, at a small cost.
+        """(N,) in [0, 1]; brightness, and an offset that all points share (white balance), are taken off at a cost.
 
         Lab is a cube root of light: light that is k times as bright makes (L + 16, a, b) cbrt(k) times as large.
         """
