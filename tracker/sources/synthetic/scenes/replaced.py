@@ -58,7 +58,8 @@ def away(seed: int, hero: str) -> Layout:
 
 
 def swapped(seed: int, hero: str) -> Layout:
-    """From one frame to the next another thing of about the object's size is where the object was, and stays there."""
+    """From one frame to the next another thing of about the object's size is where the object was, and stays there. The
+    object, and its pose, are behind the wall from then on."""
     st = stage(seed, hero, 47)
     swap_s = between(int(st.rng.integers(24, 34)))
     others = sorted(_others(hero), key=lambda thing: abs(thing.mesh.diameter_m - st.hero.mesh.diameter_m))
