@@ -12,6 +12,7 @@ import torch
 
 from reference.onboard import onboard, read_reference_frames
 from tracker.concept import ConceptModel
+from tracker.confidence import confidence
 from tracker.config import TrackerConfig
 from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import ConfigError, FrameError, ModelError
@@ -304,7 +305,8 @@ def test_a_frame_is_read_and_not_written(can_model: ConceptModel, can_frames: li
 def test_a_result_carries_its_evidence(can_model: ConceptModel, can_frames: list[Frame]) -> None:
     for result in tracked(can_model, can_frames[:3]):
         assert result.evidence is not None
-        assert result.confidence == result.evidence.score
+        assert result.grounds is not None
+        assert result.confidence == confidence(result.grounds)
         assert 0.5 < result.confidence <= 1
         assert result.covariance is not None
         assert result.covariance.shape == (6, 6)

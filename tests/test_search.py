@@ -103,13 +103,13 @@ def test_candidates_that_a_symmetry_makes_one_are_verified_once(
     ],
 )
 def test_a_pose_found_elsewhere_has_to_be_clearly_better(
-    expected: float | None, elsewhere: float | None, chosen: str
+    expected: float | None, elsewhere: float | None, chosen: str, can_view: ObjectView
 ) -> None:
     def found(score: float | None, origin: str) -> Hypothesis | None:
         if score is None:
             return None
         refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
-        return Hypothesis(refined, replace(NOTHING_SEEN, score=score), origin)
+        return Hypothesis(refined, replace(NOTHING_SEEN, score=score), origin, can_view)
 
     config = TrackerConfig(accept=0.25, jump=0.1)
     best = preferred(found(expected, "prediction"), found(elsewhere, "search"), config)

@@ -25,19 +25,19 @@ from tracker.view import ViewConfig
 
 class TrackerConfig(BaseModel):
     """prior: start from the predicted pose and search globally only where that fails; False makes every frame
-    independent, as in the paper. believe: confidence under which no pose is reported. accept, trust: score of the
-    evidence (`tracker.verification.Evidence`) from which a pose found from the prediction is preferred to others unless
-    they are better by `jump`, as objects seldom jump and may show a side that the model does not know, and from which
-    no other is looked for. verified: candidates that are refined. seed: of the sampling. device: of matching and
-    registration, "auto" is CUDA where there is one.
+    independent, as in the paper. accept: score of the evidence (`tracker.verification.Evidence`) under which a pose
+    does not explain the object's pixels, and is not reported. trust: score from which no other pose is looked for.
+    jump: by how much a pose found elsewhere has to be better than one where it was expected: objects seldom jump, and
+    may show a side that the model does not know. verified: candidates that are refined. seed: of the sampling. device:
+    of matching and registration, "auto" is CUDA where there is one.
     masks: "given" by every frame, or "carried" on by the tracker itself from the first one on, which a frame's mask
-    overrules. regain: confidence at which, where masks are carried, a lost object is believed to be seen again.
+    overrules. Where nobody gives one, no pixels are known to be the object's: believe is the confidence under which a
+    pose is not reported then, regain that under which a lost object is not believed to be seen again.
     search_every: frames between searches of the whole picture for it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     prior: bool = True
-    believe: float = Field(default=0.1, ge=0, le=1)
     accept: float = Field(default=0.25, ge=0, le=1)
     trust: float = Field(default=0.6, ge=0, le=1)
     jump: float = Field(default=0.1, ge=0, le=1)
@@ -45,6 +45,7 @@ class TrackerConfig(BaseModel):
     seed: int = 42
     device: str = "auto"
     masks: Literal["given", "carried"] = "given"
+    believe: float = Field(default=0.1, ge=0, le=1)
     regain: float = Field(default=0.3, ge=0, le=1)
     search_every: int = Field(default=3, ge=1)
     view: ViewConfig = ViewConfig()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TypeVar
 
 from tracker.cloud import LEAST_POINTS, lift
@@ -36,20 +35,18 @@ class Look:
     masked: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """A pose, and what speaks for it."""
+    """A pose, and what speaks for it. masked: by pixels that are known to be the object's."""
 
     hypothesis: Hypothesis
     grounds: Grounds
+    confidence: float
+    masked: bool
 
     @property
     def score(self) -> float:
         return self.hypothesis.evidence.score
-
-    @cached_property
-    def confidence(self) -> float:
-        return confidence(self.grounds)
 
 
 class Looking:
@@ -97,7 +94,8 @@ class Looking:
             hypothesis = self._search(sight, look.start, clock)
         if hypothesis is None:
             return "poor fit: no pose explains what is seen"
-        return Found(hypothesis, self._grounds(hypothesis, look.expected))
+        grounds = self._grounds(hypothesis, look.expected)
+        return Found(hypothesis, grounds, confidence(grounds), look.masked)
 
     def _grounds(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> Grounds:
         refined, symmetry = hypothesis.refined, self._model.symmetry

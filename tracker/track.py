@@ -60,14 +60,14 @@ class Track:
         found = yield from self._look.best(self._looks(frame, camera, clock), frame, clock)
 
         # 2. If not, is it anywhere in the picture? That takes a second frame to be believed.
-        if self._carried and not self._believed(found, frame) and self._search_due(frame):
+        if self._carried and not self._believed(found) and self._search_due(frame):
             elsewhere = yield from self._anywhere(frame, clock)
-            if self._believed(elsewhere, frame, anywhere=True):
+            if self._believed(elsewhere, anywhere=True):
                 self._carry(camera, elsewhere.hypothesis.refined.T_cam_obj)
                 return self._lost(frame, "seen again: the next frame has to confirm it", clock)
 
         # 3. What does that say about its pose, given where it has been?
-        if self._believed(found, frame):
+        if self._believed(found):
             return self._tracked(frame, found, clock)
         self._carry(camera, None)
         self._keep_in_mind(frame)
@@ -151,13 +151,16 @@ class Track:
             masks = self._proposals.masks(picture, saliency, self._config.cloud)
         return (yield from self._look.best((Look(mask, None) for mask in masks), frame, clock))
 
-    def _believed(self, found: Found | str, frame: Frame, *, anywhere: bool = False) -> TypeGuard[Found]:
-        """Less is asked of what is being tracked, or pointed out, than of what is seen again: so a state does not
-        flicker, and a look-alike is not the object."""
-        if isinstance(found, str) or found.hypothesis.evidence.surface < LEAST_SURFACE:
+    def _believed(self, found: Found | str, *, anywhere: bool = False) -> TypeGuard[Found]:
+        """Of pixels that are said to be the object's a pose has to explain enough. Elsewhere it has to be likely: less
+        is asked of what is being tracked than of what is seen again, so that a state does not flicker."""
+        if isinstance(found, str):
             return False
-        known = self._state is TrackState.TRACKING or self._model.object_id in frame.masks or not self._carried
-        return found.confidence >= (self._config.believe if known and not anywhere else self._config.regain)
+        if found.masked:
+            return found.score >= self._config.accept
+        tracking = self._state is TrackState.TRACKING and not anywhere
+        likely = found.confidence >= (self._config.believe if tracking else self._config.regain)
+        return likely and found.hypothesis.evidence.surface >= LEAST_SURFACE
 
     def _search_due(self, frame: Frame) -> bool:
         return self._model.object_id not in frame.masks and self._frames_lost % self._config.search_every == 0

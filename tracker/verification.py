@@ -59,7 +59,7 @@ class Evidence:
 NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 UNKNOWN, LEAST_EXPLAINED = 0.5, 0.3
 NO_LIGHT = np.array((-16.0, 0.0, 0.0))  # in Lab, where the cube root would be straight on to 0
-GAIN_RANGE, GAIN_SIGMA, OFFSET_SIGMA = (0.5, 2.0), 0.7, 25.0  # of Lab colours
+GAIN_RANGE, GAIN_SIGMA, OFFSET_SIGMA = (0.5, 2.0), 0.5, 25.0  # of Lab colours
 CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
 
 
