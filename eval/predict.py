@@ -6,8 +6,8 @@ It sees frames, and of the truth at most one pose an object and scene, where the
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
@@ -27,8 +27,10 @@ from tracker.errors import ConfigError, OnboardingError
 from tracker.first_masks import FirstMasks
 from tracker.frame import Frame
 from tracker.geometry import Pose
+from tracker.in_order import InOrder
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
+from tracker.smoothing import smooth_results
 from tracker.sources import PosedSource
 from tracker.viewer import NullViewer, Viewer
 
@@ -41,12 +43,13 @@ Progress = Callable[[Iterable[Frame], int, str], Iterable[Frame]]
 class Protocol:
     """How a dataset is tracked. views: reference frames an object and scene, picked from its own frames.
     poses: which of a result's poses count. vocabularies: the concepts of each object, None for the backend's own.
+    smooth: "offline" smooths the filtered poses over each scene.
     concepts: only the first so many of them, all where there are fewer. method: "ours", or a peer as `eval.peers` has
     it. initialisation: "gt" tells the method each object's true pose, once a scene, in the first frame where the object
     is visible. masks: which the dataset's frames have, those that models are made of too.
 
-    Raises ConfigError where the method does not exist, or cannot do with that initialisation, or with no view or
-    concept."""
+    Raises ConfigError where the method does not exist, or cannot do with that initialisation, with no view or concept,
+    or where there are no filtered poses to smooth."""
 
     backend: SaliencyBackend
     config: TrackerConfig
@@ -57,6 +60,7 @@ class Protocol:
     initialisation: Literal["estimated", "gt"] = "estimated"
     concepts: int | None = None
     masks: MaskKind = "visib"
+    smooth: Literal["off", "offline"] = "off"
 
     def __post_init__(self) -> None:
         if self.views < 1:
@@ -66,6 +70,11 @@ class Protocol:
         if self.config.masks == "carried" and self.method != "ours":
             raise ConfigError(
                 f"method {self.method} is given the masks of every frame: --masks carried is of no use to it"
+            )
+        if self.smooth != "off" and (self.method != "ours" or self.poses != "filtered" or not self.config.prior):
+            raise ConfigError(
+                f"--smooth {self.smooth} smooths this tracker's filtered poses: it needs --method ours, "
+                "--poses filtered and --prior on"
             )
         start = method_kind(self.method).start
         if start == "needed" and self.initialisation != "gt":
@@ -154,19 +163,32 @@ def track_scene(
     first_masks = FirstMasks()
     untold = [model.object_id for model in models] if protocol.initialisation == "gt" else []
     shown = viewer(models)
+    frames = InOrder(progress(source, len(source), f"scene {scene_id}"))
+    steps: list[tuple[int, Sequence[TrackResult]]] = []
     try:
-        for frame in progress(source, len(source), f"scene {scene_id}"):
+        for frame in frames:
             for object_id in [o for o in untold if (frame.index, o) in visible]:
                 tracker.place(object_id, truth[frame.index][object_id], frame.stamp_ns)
                 untold.remove(object_id)
             given = frame if protocol.config.masks == "given" else first_masks(frame)
             results = tracker.step(given)
             shown.show(frame, results, truth[frame.index])
-            seen = [(frame.index, result.object_id) in visible for result in results]
-            _record(tracked, dataset, scene_id, frame.index, results, seen, protocol)
+            steps.append((frame.index, [replace(result, surface=None) for result in results]))
     finally:
         shown.close()
+    if frames.refused:
+        log.warning("scene %d: %d frames left out, as time does not advance there", scene_id, frames.refused)
+    for index, results in _smoothed(steps) if protocol.smooth == "offline" else steps:
+        seen = [(index, result.object_id) in visible for result in results]
+        _record(tracked, dataset, scene_id, index, results, seen, protocol)
     return tracked
+
+
+def _smoothed(steps: Sequence[tuple[int, Sequence[TrackResult]]]) -> Iterator[tuple[int, Sequence[TrackResult]]]:
+    """Of every frame the results, with the poses of each object smoothed over the scene."""
+    smoothed = iter(smooth_results([result for _, results in steps for result in results]))
+    for index, results in steps:
+        yield index, [next(smoothed) for _ in results]
 
 
 def _onboard(

@@ -52,6 +52,7 @@ class TrackRun:
     views: int = 2
     masks: str = "visib"
     poses: Literal["filtered", "raw"] = "filtered"
+    smooth: Literal["off", "offline"] = "off"
     object_ids: tuple[str, ...] | None = None
     threads: int = 1
 
@@ -71,6 +72,7 @@ class TrackRun:
             config=self.config,
             views=self.views,
             poses=self.poses,
+            smooth=self.smooth,
             vocabularies=self.vocabularies,
             method=self.method,
             initialisation=self.initialisation,
@@ -89,6 +91,7 @@ class TrackRun:
             "masks": MASKS[self.masks],
             "reinitialisation": "by the method itself, never from the truth",
             "poses": self.poses,
+            "smoothing": self.smooth,
         }
 
     def decided_by(self, scene_id: int, backend: SaliencyBackend) -> dict[str, object]:
@@ -111,6 +114,7 @@ class TrackRun:
             "views": self.views,
             "masks": self.masks,
             "poses": self.poses,
+            "smooth": self.smooth,
             "threads": self.threads,
             "code": code_fingerprint(),
             "packages": package_versions(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -39,8 +39,10 @@ class Track:
     """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
     config: Path | None = None
     """YAML file with settings that differ from the defaults."""
+    smooth: Literal["off", "offline"] = "off"
+    """offline: every pose by all frames of the recording, also those after it; the lines are written at the end."""
     view: Literal["none", "overlay"] = "none"
-    """overlay: write overlay.mp4 to the --out folder."""
+    """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed."""
     overwrite: bool = False
     """Replace results that are in the --out folder."""
     json: bool = False
@@ -53,9 +55,12 @@ class Track:
         from tracker.config import dump_config, parse_config, read_config
         from tracker.errors import ConfigError, TrackerError
         from tracker.first_masks import FirstMasks
+        from tracker.in_order import InOrder
         from tracker.output import as_json_line, result_folder
         from tracker.pipeline import ObjectTracker
+        from tracker.result import TrackResult
         from tracker.saliency import BackendOptions, open_backend
+        from tracker.smoothing import smooth_results
         from tracker.sources import open_source
         from tracker.viewer import NullViewer, OverlayVideo
 
@@ -66,6 +71,8 @@ class Track:
             config = config.model_copy(update={"prior": self.prior == "on"})
         if self.masks is not None:
             config = parse_config({**config.model_dump(), "masks": self.masks}, f"--masks {self.masks}")
+        if self.smooth != "off" and not config.prior:
+            raise ConfigError(f"--smooth {self.smooth} smooths what is followed through time: it needs --prior on")
         if not self.model:
             raise ConfigError("--model: at least one concept model is needed; python -m reference makes one")
         models = [ConceptModel.load(path) for path in self.model]
@@ -82,23 +89,36 @@ class Track:
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
-            frames = iter(source) if self.quiet or self.json else progress(source, len(source), "tracking")
+            frames = InOrder(source if self.quiet or self.json else progress(source, len(source), "tracking"))
+            held: list[tuple[int, TrackResult]] = []
+
+            def write(frame_index: int, result: TrackResult) -> None:
+                seen = {c: r and result.locate(r) for c, r in regions[result.object_id].items()}
+                line = as_json_line(result, frame_index, seen)
+                if lines:
+                    lines.write(line + "\n")
+                if self.json:
+                    print(line, flush=True)
+
             try:
                 for frame in frames:
                     results = tracker.step(frame if config.masks == "given" else first_masks(frame))
                     viewer.show(frame, results, {})
                     for result in results:
                         summary.add(result.object_id, result.state.value, result.timings_ms["total"])
-                        seen = {c: r and result.locate(r) for c, r in regions[result.object_id].items()}
-                        line = as_json_line(result, frame.index, seen)
-                        if lines:
-                            lines.write(line + "\n")
-                        if self.json:
-                            print(line, flush=True)
+                        if self.smooth == "off":
+                            write(frame.index, result)
+                        else:  # a depth picture of every frame is held only where it is asked for
+                            held.append((frame.index, result if self.locate else replace(result, surface=None)))
             except KeyboardInterrupt:
                 STDERR.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error
+            indices, results = [index for index, _ in held], [result for _, result in held]
+            for frame_index, result in zip(indices, smooth_results(results), strict=True):
+                write(frame_index, result)
+        if frames.refused:
+            STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
         if failure:
             raise failure
         if not self.quiet and not self.json:

@@ -11,6 +11,10 @@ class FrameError(TrackerError):
     """A frame, a pose or a camera matrix that cannot be right."""
 
 
+class LateFrameError(FrameError):
+    """A frame that is not after the last one. Whoever refused it is as before: leave it out and go on."""
+
+
 class SourceError(TrackerError):
     """A source of frames that cannot be opened, or a file of it that cannot be read."""
 

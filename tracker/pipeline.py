@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
-from tracker.errors import ConfigError, FrameError
+from tracker.errors import ConfigError, FrameError, LateFrameError
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.result import TrackResult
@@ -65,10 +65,14 @@ class ObjectTracker:
         self._placed_ns = max(self._placed_ns, stamp_ns)
 
     def step(self, frame: Frame) -> tuple[TrackResult, ...]:
-        """Every model's result, in their order. Raises FrameError where time does not advance; nothing is lost then."""
+        """Every model's result, in their order.
+
+        Raises LateFrameError, a FrameError, where time does not advance: late, out of order or sent twice. The tracker
+        is as before then, so that such a frame can be left out; `tracker.in_order` does that for a whole source.
+        """
         if frame.stamp_ns <= self._last_stamp_ns or frame.stamp_ns < self._placed_ns:
             before, what = max((self._last_stamp_ns, "the last one"), (self._placed_ns, "the pose that was told"))
-            raise FrameError(
+            raise LateFrameError(
                 f"frame {frame.index} of {frame.provenance.source}: its stamp {frame.stamp_ns} ns is not after "
                 f"{what}, {before} ns"
             )

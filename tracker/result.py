@@ -10,6 +10,7 @@ import numpy as np
 from tracker.concept import ConceptModel
 from tracker.confidence import Grounds
 from tracker.geometry import Floats, Intrinsics, Pose
+from tracker.pose_filter import FilterStep
 from tracker.projection import nearest_pixels, project
 from tracker.region import Region, SeenRegion
 from tracker.verification import Evidence
@@ -50,7 +51,7 @@ class TrackResult:
     covariance: (6, 6) of `pose`, of (turn, radians; shift, metres) in camera axes about the object's origin. reason:
     why there is no pose, or how it came about. raw_pose: T_cam_obj of this frame alone, before the filter. grounds:
     what the confidence was judged by. timings_ms: stage -> milliseconds. surface: what was seen of the object, None
-    without a pose."""
+    without a pose. step: what the filter knew, for `tracker.smoothing`."""
 
     stamp_ns: int
     object_id: str
@@ -63,6 +64,7 @@ class TrackResult:
     grounds: Grounds | None
     timings_ms: dict[str, float]
     surface: Surface | None = None
+    step: FilterStep | None = None
 
     @property
     def evidence(self) -> Evidence | None:

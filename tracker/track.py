@@ -189,6 +189,7 @@ class Track:
             grounds=found.grounds,
             timings_ms=clock.timings_ms(),
             surface=Surface(self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera),
+            step=filtered.step,
         )
 
     def _lost(self, frame: Frame, reason: str, clock: Stopwatch) -> TrackResult:

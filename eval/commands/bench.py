@@ -7,6 +7,7 @@ from typing import Annotated
 
 import tyro
 
+from eval.bench.filter import FilterBench
 from eval.bench.registration import RegistrationBench
 from eval.bench.saliency import SaliencyBench
 from eval.bench.scoring import ScoringBench
@@ -14,12 +15,14 @@ from eval.bench.scoring import ScoringBench
 
 @dataclass
 class Bench:
-    """Measure speed: of saliency and registration as ratios between ways of the same work in one run."""
+    """Measure speed, of saliency and registration as ratios between ways of the same work in one run; and how steady
+    poses are over time."""
 
     what: tyro.conf.OmitArgPrefixes[
         Annotated[SaliencyBench, tyro.conf.subcommand("saliency", prefix_name=False)]
         | Annotated[RegistrationBench, tyro.conf.subcommand("registration", prefix_name=False)]
         | Annotated[ScoringBench, tyro.conf.subcommand("scoring", prefix_name=False)]
+        | Annotated[FilterBench, tyro.conf.subcommand("filter", prefix_name=False)]
     ]
 
     def __call__(self) -> None:

@@ -51,6 +51,8 @@ class Track:
     """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
     poses: Literal["filtered", "raw"] = "filtered"
     """Which poses are scored: after the filter, or of each frame alone."""
+    smooth: Literal["off", "offline"] = "off"
+    """offline: score, and write, filtered poses that are smoothed over each scene, every one by all of its frames."""
     symmetric: tuple[str, ...] | None = None
     """The objects whose ADD(-S) is ADD-S. Default: those that the dataset declares symmetric."""
     vsd: bool = False
@@ -166,6 +168,7 @@ class Track:
             views=self.views,
             masks=self.masks,
             poses=self.poses,
+            smooth=self.smooth,
             object_ids=self.objects,
             threads=self.threads,
         )
