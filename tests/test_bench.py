@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from eval.bench.filter import FilterBench
+from eval.bench.followed import Followed, jumps, lag, steadiness
 from eval.bench.methods import THRESHOLD_M, open3d_fgr, open3d_ransac, ours, peers
 from eval.bench.problems import problem
 from eval.bench.registration import RegistrationBench
@@ -16,8 +19,10 @@ from eval.bench.scored_models import OBJECTS, model, poses
 from eval.bench.scoring import ScoringBench
 from eval.symmetric_errors import mssd
 from tests.tiny_networks import save_siglip
+from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import OutputError
 from tracker.geometry import Pose
+from tracker.symmetry import NO_SYMMETRY, about
 
 
 def test_a_problem_s_right_pairs_meet_at_its_pose() -> None:
@@ -64,6 +69,39 @@ def test_the_scoring_bench_says_everything_that_it_is_asked_for(tmp_path: Path) 
     assert figures["settings"] == {"instances": 21, "objects": 21, "vertices": 200}
     with pytest.raises(OutputError, match=r"figures\.json exists"):
         ScoringBench(json=tmp_path / "figures.json")()
+
+
+def test_the_filter_bench_says_everything_that_it_is_asked_for(tmp_path: Path) -> None:
+    FilterBench(frames=30, size="240x180", json=tmp_path / "figures.json")()
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert {"still", "moving", "bowl", "soup_can", "settings"} <= set(figures)
+    assert 0 < figures["still"]["jitter_mm_smoothed"] < figures["still"]["jitter_mm_filtered"] < 2
+    assert "lag_mm" in figures["moving"]
+    assert figures["bowl"]["jump_degrees_reported"] < 10
+    with pytest.raises(OutputError, match=r"figures\.json exists"):
+        FilterBench(json=tmp_path / "figures.json")()
+
+
+def test_lag_bias_jitter_and_jumps_are_what_their_names_say() -> None:
+    """An object at 0.3 m/s, told a hundredth of a second late, 2 mm aside in every other frame, and turned once."""
+    times_s = np.arange(40) / 30
+    truth = [Pose(np.eye(3), np.array([0.3 * t, 0, 1])) for t in times_s]
+    raw = [Pose(np.eye(3), p.translation_m - np.array([0.003, 0, 0])) for p in truth]
+    turned = about(np.array([0, 0, 1.0]), np.radians(25))
+    filtered = [
+        Pose(turned if k == 20 else np.eye(3), p.translation_m + np.array([0, 0.002 * (k % 2), 0]))
+        for k, p in enumerate(raw)
+    ]
+    covariances = np.tile(np.eye(6), (40, 1, 1))
+    followed = Followed(truth, raw, filtered, raw, covariances, times_s, NO_SYMMETRY, 0)
+    assert lag(followed)["lag_mm"] == pytest.approx(3)
+    assert lag(followed)["speed_mps_of_lag"] == pytest.approx(0.3)
+    steady = steadiness(followed)
+    assert steady["bias_mm"] == pytest.approx(1)
+    assert (steady["jitter_mm_raw"], steady["jitter_mm_filtered"]) == pytest.approx((0, 2))
+    assert jumps(followed) == pytest.approx({"jump_degrees_reported": 25, "jump_degrees_alike": 25})
+    free = replace(followed, symmetry=parse_symmetry("z:inf"))
+    assert jumps(free) == pytest.approx({"jump_degrees_reported": 25, "jump_degrees_alike": 0}, abs=1e-3)
 
 
 def test_scored_models_have_the_symmetries_that_they_declare_and_estimates_near_to_them() -> None:

@@ -347,6 +347,41 @@ def test_a_run_that_is_stopped_keeps_what_was_tracked(
     assert cv2.VideoCapture(str(tmp_path / "out" / "overlay.mp4")).get(cv2.CAP_PROP_FRAME_COUNT) == 3
 
 
+def test_smoothed_poses_are_of_the_same_frames_and_come_at_the_end(model: Path, run: Run) -> None:
+    lines = {}
+    for how in ("off", "offline"):
+        said = run("tracker", SOURCE, "--model", model, "--smooth", how, "--json", "--locate", "red")
+        assert said.code == 0, said.err
+        lines[how] = [json.loads(line) for line in said.out.splitlines()]
+    assert len(lines["off"]) == len(lines["offline"]) == 6
+    moved = 0
+    for plain, smoothed in zip(lines["off"], lines["offline"], strict=True):
+        for same in ("frame", "state", "confidence", "T_cam_obj_raw"):
+            assert plain[same] == smoothed[same]
+        moved += plain["T_cam_obj"] != smoothed["T_cam_obj"]
+        assert ("regions" in plain) == ("regions" in smoothed)
+    assert moved >= 3
+    assert lines["off"][-1]["T_cam_obj"] == lines["offline"][-1]["T_cam_obj"]
+
+
+def test_a_run_that_is_stopped_keeps_what_was_smoothed_too(
+    model: Path, run: Run, tmp_path: Path, interrupted: Callable[[BaseException], None]
+) -> None:
+    interrupted(KeyboardInterrupt())
+    assert "stopped" in run("tracker", SOURCE, "--model", model, "--smooth", "offline", "--out", tmp_path / "out").err
+    assert len((tmp_path / "out" / "poses.jsonl").read_text().splitlines()) == 3
+
+
+def test_frames_that_come_late_are_left_out_and_counted(model: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = open_scene(SCENE)
+    late = [scene[index] for index in (0, 1, 1, 3, 2, 4)]
+    monkeypatch.setattr(tracker.sources, "open_source", lambda _: late)
+    said = run("tracker", SOURCE, "--model", model, "--json")
+    assert said.code == 0, said.err
+    assert [json.loads(line)["frame"] for line in said.out.splitlines()] == [0, 1, 3, 4]
+    assert "2 frames left out" in said.err
+
+
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_a_crash_leaves_no_half_folder_and_costs_no_older_results(
     overwrite: bool, model: Path, run: Run, filled: Path, interrupted: Callable[[BaseException], None]
@@ -469,6 +504,8 @@ def test_eval_track_refuses_a_folder_with_results(run: Run, filled: Path) -> Non
         (("--dataset", SOURCE, "--objects", "spoon"), ("no object 'spoon'", BOX)),
         (("--dataset", SOURCE, "--backend", "tea"), ("'tea'", "attributes")),
         (("--dataset", SOURCE, "--views", "0"), ("--views", "0")),
+        (("--dataset", SOURCE, "--smooth", "offline", "--poses", "raw"), ("--smooth offline", "--poses filtered")),
+        (("--dataset", SOURCE, "--smooth", "offline", "--prior", "off"), ("--smooth offline", "--prior on")),
         (("--dataset", SOURCE, "--method", "icp"), ("method icp", "--init gt")),
         (("--dataset", SOURCE, "--config", "absent.yaml"), ("absent.yaml",)),
     ],

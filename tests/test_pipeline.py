@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -15,9 +16,11 @@ from tracker.concept import ConceptModel
 from tracker.confidence import confidence
 from tracker.config import TrackerConfig
 from tracker.declared_symmetry import parse_symmetry
-from tracker.errors import ConfigError, FrameError, ModelError
+from tracker.errors import ConfigError, FrameError, LateFrameError, ModelError
+from tracker.first_masks import FirstMasks
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
+from tracker.in_order import InOrder
 from tracker.pipeline import ObjectTracker
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
@@ -258,9 +261,26 @@ def test_a_stamp_that_does_not_advance_is_refused_and_nothing_is_lost(
     tracker = ObjectTracker(can_model)
     results = [tracker.step(frame)[0] for frame in can_frames[:3]]
     late = replace(can_frames[3], stamp_ns=can_frames[2].stamp_ns - back_ns)
-    with pytest.raises(FrameError, match=f"frame 23 .*{late.stamp_ns} ns is not after .*{can_frames[2].stamp_ns} ns"):
+    with pytest.raises(
+        LateFrameError, match=f"frame 23 .*{late.stamp_ns} ns is not after .*{can_frames[2].stamp_ns} ns"
+    ):
         tracker.step(late)
     assert_same([*results, tracker.step(can_frames[3])[0]], undisturbed)
+
+
+@pytest.mark.parametrize("masks", ["given", "carried"])
+def test_a_stream_with_dropped_repeated_and_swapped_frames_gives_the_poses_of_those_that_came_in_time(
+    masks: Literal["given", "carried"], can_model: ConceptModel, can_frames: list[Frame]
+) -> None:
+    arriving = [can_frames[k] for k in (0, 1, 1, 3, 2, 4, 0, 9, 8)]  # 5 to 7 are dropped
+    arriving[4] = empty_mask(arriving[4])
+    ordered, first = InOrder(arriving), FirstMasks()
+    found = tracked(can_model, map(first, ordered) if masks == "carried" else ordered, TrackerConfig(masks=masks))
+    assert ordered.refused == 4
+    in_time, first = [can_frames[k] for k in (0, 1, 3, 4, 9)], FirstMasks()
+    alone = tracked(can_model, map(first, in_time) if masks == "carried" else in_time, TrackerConfig(masks=masks))
+    assert_same(found, alone)
+    assert all(result.pose for result in found)
 
 
 def test_the_same_frames_give_the_same_poses(can_model: ConceptModel, can_frames: list[Frame]) -> None:

@@ -137,6 +137,19 @@ def test_raw_poses_are_kept_where_they_are_asked_for(tracked: Tracked, protocol:
     )
 
 
+def test_smoothed_poses_are_of_the_same_frames_and_not_the_same(tracked: Tracked, protocol: Protocol) -> None:
+    smoothed = track_dataset(open_synthetic(SMALL), replace(protocol, smooth="offline"))
+    assert [e.image_id for e in smoothed.estimates] == [e.image_id for e in tracked.estimates]
+    assert smoothed.records == tracked.records
+    apart_m = [
+        a.T_cam_obj.distance_to_m(b.T_cam_obj) for a, b in zip(tracked.estimates, smoothed.estimates, strict=True)
+    ]
+    assert apart_m[-1] == 0
+    assert 1e-6 < max(apart_m) < 0.005
+    with pytest.raises(ConfigError, match=r"--smooth offline .* --poses filtered"):
+        replace(protocol, smooth="offline", poses="raw")
+
+
 def test_a_lost_frame_has_no_row_and_is_counted(tracked: Tracked, protocol: Protocol) -> None:
     ((_, _, reference),) = tracked.reference_frames
     lost = [index for index in (1, 3, 4) if index != reference]

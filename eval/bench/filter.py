@@ -17,8 +17,8 @@ SYMMETRIC = {"bowl": "z:inf", "soup_can": "z:inf"}  # of their shapes: the can's
 
 @dataclass
 class FilterBench:
-    """Follow rendered objects, at a usual camera's noise: one that is still (300 frames); one at up to 0.39 m/s; a bowl
-    and a can that may be turned by any angle. Poses before the filter, after it, and smoothed, against the true ones."""
+    """Follow rendered objects at a usual camera's noise: one that is still (300 frames), one at up to 0.39 m/s, a bowl
+    and a can that any turn leaves alike. Poses before the filter, after it, and smoothed, against the true ones."""
 
     frames: int = 300
     """Of the still object; the moving ones have three tenths of them."""

@@ -93,17 +93,19 @@ def steadiness(followed: Followed) -> dict[str, float]:
     return {**found, "consistency": float(squared.mean())}
 
 
-def lag(followed: Followed) -> dict[str, float]:
-    """How far the filtered pose is behind the true one, along its way, where that is fast; the mean, and the most."""
+def lag(followed: Followed) -> dict[str, float | None]:
+    """How far the filtered pose is behind the true one, along its way, where that is fast; the mean, and the most. None
+    where nothing is fast."""
     way = np.gradient(np.array([pose.translation_m for pose in followed.truth]), followed.times_s, axis=0)
     speed_mps = np.linalg.norm(way, axis=1)
     fast = (speed_mps > FAST_MPS) & (np.arange(len(way)) >= SETTLED_FRAMES)
     behind_m = -(followed.errors(followed.filtered)[fast, 3:] * way[fast]).sum(axis=1) / speed_mps[fast]
-    some = behind_m if fast.any() else np.array([np.nan])
+    if not fast.any():
+        return dict.fromkeys(("lag_mm", "lag_mm_greatest", "speed_mps_of_lag"))
     return {
-        "lag_mm": float(some.mean()) * 1e3,
-        "lag_mm_greatest": float(np.abs(some).max()) * 1e3,
-        "speed_mps_of_lag": float(speed_mps[fast].mean()) if fast.any() else float("nan"),
+        "lag_mm": float(behind_m.mean()) * 1e3,
+        "lag_mm_greatest": float(np.abs(behind_m).max()) * 1e3,
+        "speed_mps_of_lag": float(speed_mps[fast].mean()),
     }
 
 
