@@ -23,22 +23,22 @@ from scipy.stats import chi2
 from tracker.geometry import Floats, Pose
 
 START_SPEED_MPS, START_TURN_RADPS = 0.5, 2.0  # how fast an object may be when it is first seen
-LEVELS = np.array([1.0, 0.2, 0.04, 0.008])  # shares of the greatest acceleration that may be all there is
+LEVELS = np.array([1.0, 0.2, 0.04, 0.01])  # shares of the greatest acceleration that may be all there is
 UNKNOWN = 1e-6  # information below this share of a least sigma's is none
 WHITE = 0.01  # share of the least variances that is taken for noise: no measurement is without
 
 
 class FilterConfig(BaseModel):
     """acceleration_mps2, acceleration_radps2: standard deviation of the greatest unknown acceleration between object
-    and camera, a jerk of a hand; how much of it there is, down to a hundredth, the filter finds out. calm_s: mean time
+    and camera; how much of it there is, down to a hundredth, the filter finds out. calm_s: mean time
     for which the motion stays as wild, or as calm, as it is. gate: probability that a true measurement lies within the
     gate. least_sigma_m, least_sigma_rad: what a measurement errs by beside its noise (calibration, the model): no
     number of frames makes a pose surer. longest_gap_s: after a longer silence the velocity is forgotten."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    acceleration_mps2: float = Field(default=20.0, gt=0)
-    acceleration_radps2: float = Field(default=100.0, gt=0)
+    acceleration_mps2: float = Field(default=5.0, gt=0)
+    acceleration_radps2: float = Field(default=30.0, gt=0)
     calm_s: float = Field(default=0.1, gt=0)
     gate: float = Field(default=0.9999, gt=0, lt=1)
     least_sigma_m: float = Field(default=0.0003, gt=0)
