@@ -71,8 +71,14 @@ class Track:
             return self._tracked(frame, found, clock)
         self._carry(camera, None)
         self._keep_in_mind(frame)
-        reason = found if isinstance(found, str) else f"poor fit: the best pose is right at {found.confidence:.0%}"
-        return self._lost(frame, reason, clock)
+        return self._lost(frame, self._why_not(found), clock)
+
+    @staticmethod
+    def _why_not(found: Found | str) -> str:
+        if isinstance(found, str):
+            return found
+        judged = f"explains {found.score:.2f} of it" if found.masked else f"is right at {found.confidence:.0%}"
+        return f"poor fit: the best pose {judged}"
 
     def _carry(self, camera: CameraMotion, suspected: Pose | None) -> None:
         """Take where it was along with the camera, and where it may be, until it is found."""

@@ -25,7 +25,7 @@ class VerificationConfig(BaseModel):
     model_points: int = Field(default=1000, ge=50)
     depth_sigma: float = Field(default=0.03, gt=0)
     depth_sigma_least_m: float = Field(default=0.003, gt=0)
-    lab_sigma: float = Field(default=14.0, gt=0)
+    lab_sigma: float = Field(default=12.0, gt=0)
     colour_share: float = Field(default=0.7, ge=0, le=1)
 
 
