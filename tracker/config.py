@@ -28,8 +28,9 @@ class TrackerConfig(BaseModel):
     independent, as in the paper. accept: score of the evidence (`tracker.verification.Evidence`) under which a pose
     does not explain the object's pixels, and is not reported. trust: score from which no other pose is looked for.
     jump: by how much a pose found elsewhere has to be better than one where it was expected: objects seldom jump, and
-    may show a side that the model does not know. verified: candidates that are refined. seed: of the sampling. device:
-    of matching and registration, "auto" is CUDA where there is one.
+    may show a side that the model does not know. concepts_every: looks of which one asks for the concepts, where
+    surface and colours alone lead from the prediction to a pose of the confidence `sure`. verified: candidates that are
+    refined. seed: of the sampling. device: of matching and registration, "auto" is CUDA where there is one.
     masks: "given" by every frame, or "carried" on by the tracker itself from the first one on, which a frame's mask
     overrules. Where nobody gives one, no pixels are known to be the object's: believe is the confidence under which a
     pose is not reported then, regain that under which a lost object is not believed to be seen again.
@@ -41,6 +42,8 @@ class TrackerConfig(BaseModel):
     accept: float = Field(default=0.25, ge=0, le=1)
     trust: float = Field(default=0.6, ge=0, le=1)
     jump: float = Field(default=0.1, ge=0, le=1)
+    sure: float = Field(default=0.5, ge=0, le=1)
+    concepts_every: int = Field(default=30, ge=1)
     verified: int = Field(default=5, ge=1, le=64)
     seed: int = 42
     device: str = "auto"

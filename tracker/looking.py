@@ -56,6 +56,7 @@ class Looking:
         self._model, self._config = model, config
         self._search = Search(model, config)
         self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
+        self._without_concepts = 0  # looks in a row that did without
 
     def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
         """The best of what the looks find, no further than the first that leaves no doubt; or why there is nothing."""
@@ -83,17 +84,27 @@ class Looking:
             view = view_object(frame, look.mask, self._model.diameter_m, self._config.view)
         if view is None:
             return "no depth within the mask"
+        sight = Sight.of(view, masked=look.masked)
+        if look.start is not None and self._without_concepts < self._config.concepts_every - 1:
+            continued = self._found(self._search.continued(look.start, sight, clock), look)
+            if continued and continued.score >= self._config.trust and continued.confidence >= self._config.sure:
+                self._without_concepts += 1
+                return continued
         saliency = yield view
+        self._without_concepts = 0
         with clock("cloud"):
-            sight = Sight.of(view, lift(view, saliency, self._config.cloud), masked=look.masked)
-        if len(sight.cloud) < LEAST_POINTS:
-            return f"too little to see: {len(sight.cloud)} usable points, {LEAST_POINTS} are needed"
+            cloud = lift(view, saliency, self._config.cloud)
+        if len(cloud) < LEAST_POINTS:
+            return f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
         if look.alone and look.start is not None:
-            hypothesis = self._search.near(look.start, sight, clock)
+            hypothesis = self._search.near(look.start, sight, cloud, clock)
         else:
-            hypothesis = self._search(sight, look.start, clock)
+            hypothesis = self._search(sight, cloud, look.start, clock)
+        return self._found(hypothesis, look) or "poor fit: no pose explains what is seen"
+
+    def _found(self, hypothesis: Hypothesis | None, look: Look) -> Found | None:
         if hypothesis is None:
-            return "poor fit: no pose explains what is seen"
+            return None
         grounds = self._grounds(hypothesis, look.expected)
         return Found(hypothesis, grounds, confidence(grounds), look.masked)
 

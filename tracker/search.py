@@ -27,13 +27,12 @@ class Sight:
     """What one frame shows of an object, and maybe of what is around it. masked: all of it is known to be of it."""
 
     view: ObjectView
-    cloud: PointCloud
     appearance: ViewAppearance
     masked: bool
 
     @classmethod
-    def of(cls, view: ObjectView, cloud: PointCloud, *, masked: bool = True) -> Sight:
-        return cls(view, cloud, view_appearance(view), masked)
+    def of(cls, view: ObjectView, *, masked: bool) -> Sight:
+        return cls(view, view_appearance(view), masked)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,50 +57,54 @@ class Search:
         self._refine = Refiner(model, config.refinement, config.view.pixels_across)
         self._verify = Verifier(model, config.verification, config.view.pixels_across)
         self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
-        self._matched: tuple[Sight, Correspondences] | None = None
+        self._matched: tuple[PointCloud, Correspondences] | None = None
 
-    def __call__(self, sight: Sight, predicted: Pose | None, clock: Stopwatch) -> Hypothesis | None:
+    def __call__(self, sight: Sight, cloud: PointCloud, predicted: Pose | None, clock: Stopwatch) -> Hypothesis | None:
         """The pose that explains best what is seen, anywhere where none is clearly near a prediction; or None."""
-        found = None if predicted is None else self.near(predicted, sight, clock)
+        found = None if predicted is None else self.near(predicted, sight, cloud, clock)
         if found is None or found.evidence.score < self._config.trust:
-            found = preferred(found, self.anywhere(sight, clock), self._config)
+            found = preferred(found, self.anywhere(sight, cloud, clock), self._config)
         return found
 
-    def near(self, predicted: Pose, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
+    def continued(self, predicted: Pose, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
+        """The pose that surface and colours lead to from the prediction, without any concept."""
+        return self._refined(predicted, sight, "prediction", clock)
+
+    def near(self, predicted: Pose, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> Hypothesis | None:
         """The better of two poses near the prediction: by surfaces alone, and pulled by the concepts first."""
-        correspondences = self._correspondences(sight, clock)
+        correspondences = self._correspondences(cloud, clock)
         with clock("closest points"):
-            pulled = self._closest.align(self._closest.pull(predicted, correspondences, sight.cloud), sight.cloud)
-            direct = self._closest.align(predicted, sight.cloud)
+            pulled = self._closest.align(self._closest.pull(predicted, correspondences, cloud), cloud)
+            direct = self._closest.align(predicted, cloud)
         found = self._refined(pulled, sight, "concepts", clock)
         if direct and pulled and self._alike(direct, pulled):
             return found
         return better(self._refined(direct, sight, "prediction", clock), found)
 
-    def _correspondences(self, sight: Sight, clock: Stopwatch) -> Correspondences:
-        """Which of the cloud's points is which point of the model? Of the last sight they are kept."""
-        if self._matched is None or self._matched[0] is not sight:
+    def _correspondences(self, cloud: PointCloud, clock: Stopwatch) -> Correspondences:
+        """Which of the cloud's points is which point of the model? Of the last cloud they are kept."""
+        if self._matched is None or self._matched[0] is not cloud:
             with clock("matching"):
-                self._matched = (sight, self._match(sight.cloud))
+                self._matched = (cloud, self._match(cloud))
         return self._matched[1]
 
     def _alike(self, a: Pose, b: Pose) -> bool:
         """So near that refinement brings them to the same pose."""
         return a.angle_to_rad(b) < 0.03 and a.distance_to_m(b) < 0.01 * self._model.diameter_m
 
-    def anywhere(self, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
+    def anywhere(self, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> Hypothesis | None:
         """The best of the poses on which correspondences agree, wherever that is."""
-        correspondences = self._correspondences(sight, clock)
+        correspondences = self._correspondences(cloud, clock)
         with clock("registration"):
             generator = torch.Generator(self._device).manual_seed(self._config.seed)
-            candidates = register(correspondences, sight.cloud, self._model, self._config.registration, generator)
+            candidates = register(correspondences, cloud, self._model, self._config.registration, generator)
             candidates = self._inequivalent(candidates)
         with clock("verification"):
             candidates.sort(key=lambda candidate: -self._roughly(candidate.T_cam_obj, sight))
         best = None
         for candidate in candidates[: self._config.verified]:
             with clock("closest points"):
-                closer = self._closest.align(candidate.T_cam_obj, sight.cloud)
+                closer = self._closest.align(candidate.T_cam_obj, cloud)
             best = better(best, self._refined(closer, sight, "search", clock))
         return best
 
