@@ -37,6 +37,7 @@ FINE = ViewConfig(pixels_across=150)
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sighting:
     sight: Sight
+    cloud: PointCloud
     truth: Pose
 
 
@@ -59,17 +60,17 @@ def whole_pose() -> dict[str, Any]:
     starts = [seen.truth.nudged(_off(k)) for k, seen in enumerate(sights)]
     tree = small_gicp.preprocess_points(model.points, downsampling_resolution=GRID_M)
 
-    def from_scratch(sight: Sight, _: Pose) -> Pose:
-        found = search(sight, None, Stopwatch())
+    def from_scratch(seen: _Sighting, _: Pose) -> Pose:
+        found = search(seen.sight, seen.cloud, None, Stopwatch())
         return found.refined.T_cam_obj if found else Pose.identity()
 
-    def gicp(sight: Sight, start: Pose) -> Pose:
-        cloud, _ = small_gicp.preprocess_points(sight.cloud.points, downsampling_resolution=GRID_M)
+    def gicp(seen: _Sighting, start: Pose) -> Pose:
+        cloud, _ = small_gicp.preprocess_points(seen.cloud.points, downsampling_resolution=GRID_M)
         result = small_gicp.align(tree[0], cloud, tree[1], start.inverse().matrix, registration_type="GICP")
         return Pose.from_matrix(result.T_target_source).inverse()
 
-    def refined(sight: Sight, start: Pose) -> Pose:
-        found = refine(start, sight.view, sight.appearance)
+    def refined(seen: _Sighting, start: Pose) -> Pose:
+        found = refine(start, seen.sight.view, seen.sight.appearance)
         return found.T_cam_obj if found else start
 
     whole = _timed(from_scratch, sights, starts)
@@ -80,7 +81,7 @@ def whole_pose() -> dict[str, Any]:
         "refinement_ms": refinement["ms"],
         "refinement": refinement,
         "refinement_gicp": _timed(gicp, sights, starts),
-        "global_pose_points": [POINTS, min(len(seen.sight.cloud) for seen in sights)],
+        "global_pose_points": [POINTS, min(len(seen.cloud) for seen in sights)],
     }
 
 
@@ -96,7 +97,8 @@ def _seen(posed: PosedFrame, model: ConceptModel, labels: tuple[str, ...]) -> _S
     cloud = lift(view, open_backend("attributes")([Query(view, labels)])[0], CloudConfig())
     kept = np.linspace(0, len(cloud) - 1, min(POINTS, len(cloud))).round().astype(int)
     parts = (cloud.points, cloud.normals, cloud.colours, cloud.saliency)
-    return _Sighting(Sight.of(view, PointCloud(*(part[kept] for part in parts))), posed.T_cam_obj)
+    thinned = PointCloud(*(part[kept] for part in parts))
+    return _Sighting(Sight.of(view, masked=True), thinned, posed.T_cam_obj)
 
 
 def _off(seed: int) -> np.ndarray:
@@ -105,12 +107,12 @@ def _off(seed: int) -> np.ndarray:
     return np.concatenate((turn, shift * SHIFT_M / np.linalg.norm(shift)))
 
 
-def _timed(way: Callable[[Sight, Pose], Pose], sights: list[_Sighting], starts: list[Pose]) -> dict[str, float]:
-    way(sights[0].sight, starts[0])
+def _timed(way: Callable[[_Sighting, Pose], Pose], sights: list[_Sighting], starts: list[Pose]) -> dict[str, float]:
+    way(sights[0], starts[0])
     spent, degrees, millimetres = [], [], []
     for seen, start in list(zip(sights, starts, strict=True)) * 2:
         began = time.perf_counter()
-        found = way(seen.sight, start)
+        found = way(seen, start)
         spent.append(time.perf_counter() - began)
         degrees.append(float(np.degrees(found.angle_to_rad(seen.truth))))
         millimetres.append(found.distance_to_m(seen.truth) * 1e3)

@@ -1,0 +1,101 @@
+"""Looking at places one after the other: no further than needed, and for concepts only as often as asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tracker.concept import ConceptModel
+from tracker.confidence import confidence
+from tracker.config import TrackerConfig
+from tracker.frame import Frame
+from tracker.geometry import Pose
+from tracker.looking import Found, Look, Looking
+from tracker.saliency import Query, SaliencyBackend
+from tracker.sources.synthetic import SyntheticScene
+from tracker.stopwatch import Stopwatch
+
+CAN = "soup_can"
+
+
+class Counted:
+    """Looks, and answers what is asked for."""
+
+    def __init__(self, model: ConceptModel, backend: SaliencyBackend, config: TrackerConfig) -> None:
+        self.asked, self.seen = 0, 0
+        self._model, self._backend = model, backend
+        self._looking = Looking(model, config)
+
+    def __call__(self, looks: list[Look | str], frame: Frame) -> Found | str:
+        def counted():
+            for look in looks:
+                self.seen += 1
+                yield look
+
+        asking = self._looking.best(counted(), frame, Stopwatch())
+        try:
+            view = next(asking)
+            while True:
+                self.asked += 1
+                view = asking.send(self._backend([Query(view, self._model.labels)])[0])
+        except StopIteration as ended:
+            return ended.value
+
+
+@pytest.fixture
+def can_looking(can_model: ConceptModel, attributes: SaliencyBackend) -> Counted:
+    return Counted(can_model, attributes, TrackerConfig(concepts_every=4))
+
+
+def assert_at(found: Found | str, truth: Pose) -> None:
+    assert isinstance(found, Found), found
+    pose = found.hypothesis.refined.T_cam_obj
+    assert pose.distance_to_m(truth) < 0.003
+    assert np.degrees(pose.angle_to_rad(truth)) < 3
+
+
+def test_the_first_place_without_doubt_is_the_last_that_is_looked_at(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    frame = can_frames[0]
+    look = Look(frame.masks[CAN], None, masked=True)
+    assert_at(can_looking(["hidden", look, look], frame), can_truth)
+    assert can_looking.seen == 2
+
+
+def test_where_nothing_is_the_last_word_is_the_reason(can_looking: Counted, can_frames: list[Frame]) -> None:
+    assert can_looking(["out of view", "hidden"], can_frames[0]) == "hidden"
+    assert can_looking([], can_frames[0]) == "nothing in the picture looks like it"
+
+
+def test_concepts_are_asked_for_once_in_so_many_looks(
+    can_scene: SyntheticScene, can_looking: Counted, can_frames: list[Frame]
+) -> None:
+    for frame in can_frames[:9]:
+        truth = can_scene.sightings(CAN)[frame.index].T_cam_obj
+        look = Look(frame.masks[CAN], truth, (truth,), masked=True)
+        assert_at(can_looking([look], frame), truth)
+    assert can_looking.asked == 2  # the fourth and the eighth time
+
+
+def test_concepts_are_asked_for_where_surface_and_colours_do_not_lead_to_it(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    far = can_truth.nudged(np.array((0, 0, 2.0, 0.05, 0, 0)))
+    assert_at(can_looking([Look(can_frames[0].masks[CAN], far, (far,), masked=True)], can_frames[0]), can_truth)
+    assert can_looking.asked == 1
+
+
+def test_what_is_far_from_where_it_was_expected_is_less_likely(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    mask = can_frames[0].masks[CAN]
+    far = can_truth.nudged(np.array((0, 0, 1.0, 0.05, 0, 0)))
+    near, surprising = (
+        can_looking([Look(mask, None, (pose,), masked=True)], can_frames[0]) for pose in (can_truth, far)
+    )
+    assert isinstance(near, Found)
+    assert isinstance(surprising, Found)
+    assert near.grounds.evidence == surprising.grounds.evidence
+    assert near.confidence == confidence(near.grounds) > surprising.confidence
+    assert surprising.grounds.turn_rad == pytest.approx(1.0, abs=0.1)
