@@ -1,5 +1,5 @@
 """`python -m eval track` runs the tracker on a dataset and scores it, `pairs` on pairs of images, `scenarios` where it
-gets lost; `score` scores anybody's BOP result file."""
+gets lost; `calibrate` fits its confidence; `score` scores anybody's BOP result file."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import tyro
 
 from eval.commands.ablate import Ablate
 from eval.commands.bench import Bench
+from eval.commands.calibrate import Calibrate
 from eval.commands.pairs import Pairs
 from eval.commands.scenarios import Scenarios
 from eval.commands.score import Score
@@ -24,6 +25,7 @@ def main() -> None:
                 "score": Score,
                 "pairs": Pairs,
                 "scenarios": Scenarios,
+                "calibrate": Calibrate,
                 "ablate": Ablate,
                 "bench": Bench,
             },

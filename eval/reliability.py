@@ -70,4 +70,9 @@ def reliability_of(confidences: Sequence[float], right: Sequence[bool], bins: in
 
 
 def is_right(row: InstanceError) -> bool:
-    return row.translation_m < RIGHT_WITHIN_M and row.symmetric_rotation_deg < RIGHT_WITHIN_DEG
+    return right_within(row.translation_m, row.symmetric_rotation_deg)
+
+
+def right_within(error_m: float, error_deg: float) -> bool:
+    """Less than 2 cm and 10 degrees off."""
+    return error_m < RIGHT_WITHIN_M and error_deg < RIGHT_WITHIN_DEG

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
 import eval.__main__
@@ -18,14 +19,17 @@ import reference.__main__
 import tracker.__main__
 import tracker.sources
 from eval.bop_results import read_results
+from eval.calibration.rows import JudgedPose, write_poses
 from eval.scenarios.frame_log import FrameLog
 from eval.scenarios.run import RunLog, ScenarioRun
 from tracker.concept import ConceptModel
+from tracker.confidence import Grounds
 from tracker.config import TrackerConfig, read_config
 from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import SourceError
 from tracker.frame import Frame
 from tracker.sources.synthetic import open_scene
+from tracker.verification import Evidence
 
 BOX = "tea_box"
 SCENE = f"turn?size=160x120&frames=6&object={BOX}"
@@ -630,3 +634,21 @@ def test_eval_scenarios_refuses_what_it_does_not_know(
     options: tuple[object, ...], words: tuple[str, ...], run: Run
 ) -> None:
     assert_refused(run("eval", "scenarios", *options), *words)
+
+
+def test_eval_calibrate_fits_to_poses_that_were_kept_and_prints_the_weights(run: Run, tmp_path: Path) -> None:
+    path, rng = tmp_path / "poses.json", np.random.default_rng(0)
+    poses = []
+    for index in range(200):
+        colour = rng.random()
+        evidence = Evidence(0.5, 0.5, colour, 0.0, 0.0, 0.0, 1.0, 0.5)
+        scene = ("away", "hand")[index % 2]
+        poses.append(JudgedPose(scene, scene, "mug", index, bool(rng.random() < colour), Grounds(evidence, 0.05)))
+    write_poses(path, {}, poses)
+    said = run("eval", "calibrate", "--rows", path)
+    assert (said.code, said.out) == (0, ""), said.err
+    assert "WEIGHTS = np.array([" in said.err
+    assert {"away", "hand"} <= set(said.err.split())
+    assert_refused(run("eval", "calibrate", "--rows", path, "--json", path), "--rows and --json")
+    assert_refused(run("eval", "calibrate", "--seeds", 0), "--seeds")
+    assert_refused(run("eval", "calibrate", "--json", path), "poses.json", "--overwrite")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eval.reliability import RIGHT_WITHIN_DEG, RIGHT_WITHIN_M
+from eval.reliability import right_within
 
 LEAST_IN_SIGHT, HALF = 0.05, 0.5  # visible fractions: of an object in sight, and of one that a tracker has to find
 ASTRAY_M = 0.05
@@ -66,4 +66,4 @@ class FrameLog:
         """Less than 2 cm and 10 degrees off, of an object of which something can be seen, be it in colour alone."""
         if self.error_m is None or self.error_deg is None or self.visible < LEAST_IN_SIGHT:
             return False
-        return self.error_m < RIGHT_WITHIN_M and self.error_deg < RIGHT_WITHIN_DEG
+        return right_within(self.error_m, self.error_deg)

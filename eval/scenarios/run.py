@@ -66,7 +66,7 @@ def run_scenario(run: ScenarioRun) -> RunLog:
     turns_rad = [0.0, *(a.T_cam_obj.angle_to_rad(b.T_cam_obj) for a, b in pairwise(sightings))]
     with torch_threads(1):
         try:
-            model = _model(run, object_id)
+            model = clean_model(object_id, run.seed, run.size, run.views)
         except OnboardingError as error:
             logging.getLogger(__name__).warning("%s, seed %d: %s", run.scenario, run.seed, error)
             return RunLog(run.scenario, run.seed, object_id, (), str(error))
@@ -92,11 +92,10 @@ def run_scenario(run: ScenarioRun) -> RunLog:
     return RunLog(run.scenario, run.seed, object_id, log)
 
 
-def _model(run: ScenarioRun, object_id: str) -> ConceptModel:
-    clean = open_scene(
-        f"{REFERENCE_SCENE}?object={object_id}&seed={run.seed}&size={run.size}&frames={REFERENCE_FRAMES}"
-    )
-    return onboard(read_reference_frames(clean, object_id, run.views), opened_backend(BACKEND, BackendOptions()))
+def clean_model(object_id: str, seed: int, size: str, views: int) -> ConceptModel:
+    """From a scene in which the object is alone and turns once all around. Raises OnboardingError where that fails."""
+    scene = open_scene(f"{REFERENCE_SCENE}?object={object_id}&seed={seed}&size={size}&frames={REFERENCE_FRAMES}")
+    return onboard(read_reference_frames(scene, object_id, views), opened_backend(BACKEND, BackendOptions()))
 
 
 def _said(result: TrackResult, truth: Pose, symmetries: ObjectSymmetries) -> dict[str, Any]:
