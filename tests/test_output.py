@@ -116,7 +116,7 @@ TRACKED = TrackResult(
     covariance=COVARIANCE,
     reason="found by search",
     raw_pose=Pose.identity(),
-    grounds=Grounds(Evidence(*[0.123456] * len(fields(Evidence))), 0.01, 0.02, 0.03),
+    grounds=Grounds(Evidence(*[0.123456] * len(fields(Evidence))), 0.01, 0.03),
     timings_ms={"view": 1.23456, "total": 20.0},
 )
 LOST = TrackResult(33, "mug", None, TrackState.LOST, 0.0, None, "out of view", None, None, {"total": 0.5})

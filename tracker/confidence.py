@@ -15,36 +15,28 @@ from tracker.refinement import Refined
 from tracker.symmetry import Symmetry
 from tracker.verification import Evidence
 
-MEASURES = ("colour", "turn_sigma", "shift", "turn", "not_expected", "constant")
-WEIGHTS = np.array([1.28, -1.27, -0.12, -0.90, 2.82, -9.89])
+MEASURES = ("colour", "explained", "turn_sigma", "turn", "not_expected", "constant")
+WEIGHTS = np.array([3.02, 0.91, -2.79, -0.59, 0.60, -17.24])
 LEAST_INFORMATION = 1e-6  # of a direction that the data leave free
-LEAST = 0.02  # a share, an angle or a way nearer to 0 than this says no more than this
+LEAST = 0.02  # a share or an angle nearer to 0 than this says no more than this
 
 
 @dataclass(frozen=True, slots=True)
 class Grounds:
     """What speaks for a pose. evidence: of the picture. turn_sigma_rad: standard deviation of its rotation, by the
-    information that refinement had. shift, turn_rad: how far it is from the nearest pose that was expected, as a share
-    of the diameter and an angle modulo the symmetry; None where none was."""
+    information that refinement had. turn_rad: angle from the nearest pose that was expected, modulo the symmetry; None
+    where none was."""
 
     evidence: Evidence
     turn_sigma_rad: float
-    shift: float | None = None
     turn_rad: float | None = None
 
     def measures(self) -> Floats:
         """(M,) what the confidence is a function of: in the order of `MEASURES`."""
-        expected = self.shift is not None and self.turn_rad is not None
-        return np.array(
-            [
-                _log_odds(self.evidence.colour),
-                np.log(np.clip(self.turn_sigma_rad, 1e-4, 1.0)),
-                np.log(LEAST + self.shift) if expected else 0.0,
-                np.log(LEAST + self.turn_rad) if expected else 0.0,
-                0.0 if expected else 1.0,
-                1.0,
-            ]
-        )
+        colour, explained = _log_odds(self.evidence.colour), _log_odds(self.evidence.explained)
+        sigma = np.log(np.clip(self.turn_sigma_rad, 1e-4, 1.0))
+        turned = (0.0, 1.0) if self.turn_rad is None else (np.log(LEAST + self.turn_rad), 0.0)
+        return np.array([colour, explained, sigma, *turned, 1.0])
 
 
 def turn_sigma_rad(refined: Refined, symmetry: Symmetry) -> float:

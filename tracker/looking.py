@@ -115,5 +115,4 @@ class Looking:
             return grounds
         pose = refined.T_cam_obj
         nearest = min(expected, key=pose.distance_to_m)
-        shift = pose.distance_to_m(nearest) / self._model.diameter_m
-        return replace(grounds, shift=shift, turn_rad=symmetry.nearest(pose, nearest).angle_to_rad(nearest))
+        return replace(grounds, turn_rad=symmetry.nearest(pose, nearest).angle_to_rad(nearest))
