@@ -25,7 +25,7 @@ from tracker.verification import Evidence
 
 TRUE = np.array([1.5, -0.8, 0.4])  # the last is of the constant
 EVIDENCE = Evidence(0.6, 0.8, 0.7, 0.0, 0.1, 0.0, 0.9, 0.5)
-POSE = JudgedPose("away", "away 1", "mug", 3, True, Grounds(EVIDENCE, 0.05, 0.01, 0.02))
+POSE = JudgedPose("away", "away 1", "mug", 3, True, Grounds(EVIDENCE, 0.05, 0.02))
 
 
 def simulated(count: int = 20_000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
