@@ -18,6 +18,8 @@ from tracker.silhouette import Silhouette
 from tracker.stopwatch import Stopwatch
 from tracker.view import ObjectView, view_object
 
+STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
+
 T = TypeVar("T")
 Asking = Generator[ObjectView, Saliency, T]  # asks for the saliency of a view, as often as it takes
 
@@ -57,6 +59,7 @@ class Looking:
         self._search = Search(model, config)
         self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
         self._without_concepts = 0  # looks in a row that did without
+        self._score = 1.0  # of what was found last
 
     def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
         """The best of what the looks find, no further than the first that leaves no doubt; or why there is nothing."""
@@ -65,8 +68,9 @@ class Looking:
             seen = look if isinstance(look, str) else (yield from self._seen(look, frame, clock))
             if isinstance(best, str) or (not isinstance(seen, str) and self._better(seen, best)):
                 best = seen
-            if not isinstance(best, str) and best.score >= self._config.trust:
+            if not isinstance(best, str) and self._clear(best):
                 break
+        self._score = 1.0 if isinstance(best, str) else best.score
         return best
 
     def outline(self, T_cam_obj: Pose, frame: Frame, clock: Stopwatch) -> Mask | str:
@@ -87,7 +91,7 @@ class Looking:
         sight = Sight.of(view, masked=look.masked)
         if look.start is not None and self._without_concepts < self._config.concepts_every - 1:
             continued = self._found(self._search.continued(look.start, sight, clock), look)
-            if continued and continued.score >= self._config.trust and continued.confidence >= self._config.sure:
+            if continued and self._sure(continued):
                 self._without_concepts += 1
                 return continued
         saliency = yield view
@@ -101,6 +105,16 @@ class Looking:
         else:
             hypothesis = self._search(sight, cloud, look.start, clock)
         return self._found(hypothesis, look) or "poor fit: no pose explains what is seen"
+
+    def _clear(self, found: Found) -> bool:
+        """Whether nothing better is to be expected: it fits well, and not much worse than the last time."""
+        return found.score >= max(self._config.trust, self._score - self._config.jump)
+
+    def _sure(self, continued: Found) -> bool:
+        """Whether concepts could say nothing new, as it is clearly where it was expected. Surface and colours alone let
+        a plain cup slide around its axis until the handle is out of sight."""
+        steady = continued.grounds.turn_rad is not None and continued.grounds.turn_rad < STEADY_RAD
+        return steady and self._clear(continued) and continued.confidence >= self._config.sure
 
     def _found(self, hypothesis: Hypothesis | None, look: Look) -> Found | None:
         if hypothesis is None:
