@@ -85,26 +85,33 @@ def test_an_object_in_a_run_has_the_weight_of_any_other() -> None:
         training_set([])
 
 
-def test_a_kind_of_scene_is_judged_by_the_others() -> None:
+def test_a_kind_of_scene_is_judged_by_fits_to_the_others() -> None:
     measures, right, weights = simulated(3000)
     scenes = np.repeat(["a", "b", "c"], 1000)
     right[scenes == "c"] ^= True  # where all is the other way round, which only c's own rows can tell
-    found = held_out_chances(TrainingSet(measures, right, weights, scenes))
+    rows = TrainingSet(measures, right, weights, scenes, np.repeat("mug", 3000))
+    found = held_out_chances(rows, rows.scenes)
     judged = judge("c", found[scenes == "c"], right[scenes == "c"])
     assert (judged.poses, judged.wrong) == (1000, int((~right[scenes == "c"]).sum()))
     assert judged.auroc is not None
     assert judged.auroc < 0.3
     assert judged.reliability.calibration_error > 0.3
-    with pytest.raises(ConfigError, match="two kinds"):
-        held_out_chances(TrainingSet(measures, right, weights, np.repeat("a", 3000)))
+    with pytest.raises(ConfigError, match="two scenes or objects"):
+        held_out_chances(rows, rows.object_ids)
 
 
-def test_poses_are_read_as_they_were_written_and_anything_else_is_refused(tmp_path: Path) -> None:
+def test_poses_are_read_as_they_were_written_and_anything_else_is_refused(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     poses = [POSE, replace(POSE, right=False, grounds=Grounds(EVIDENCE, 0.2))]
     path = tmp_path / "poses.json"
     write_poses(path, {"runs": ["away 1"]}, poses)
     assert read_poses(path) == poses
+    assert not caplog.records
     content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"code": "of last week"}))
+    assert read_poses(path) == poses
+    assert "other source code" in caplog.text
     del content["poses"][1]["grounds"]["evidence"]["colour"]
     for text, words in (
         (json.dumps(content), r"poses\.1\.grounds\.evidence\.colour"),

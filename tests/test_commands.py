@@ -643,7 +643,8 @@ def test_eval_calibrate_fits_to_poses_that_were_kept_and_prints_the_weights(run:
         colour = rng.random()
         evidence = Evidence(0.5, 0.5, colour, 0.0, 0.0, 0.0, 1.0, 0.5)
         scene = ("away", "hand")[index % 2]
-        poses.append(JudgedPose(scene, scene, "mug", index, bool(rng.random() < colour), Grounds(evidence, 0.05)))
+        name = ("mug", "bowl")[index // 2 % 2]
+        poses.append(JudgedPose(scene, scene, name, index, bool(rng.random() < colour), Grounds(evidence, 0.05)))
     write_poses(path, {}, poses)
     said = run("eval", "calibrate", "--rows", path)
     assert (said.code, said.out) == (0, ""), said.err

@@ -1,4 +1,4 @@
-"""What a fit is worth in scenes of a kind that it has not seen."""
+"""What a fit is worth in scenes of a kind, and for objects, that it has not seen."""
 
 from __future__ import annotations
 
@@ -26,15 +26,17 @@ class Judgement:
     reliability: Reliability
 
 
-def held_out_chances(rows: TrainingSet) -> Floats:
-    """(N,) each by the weights that are fitted to the other kinds of scene. Raises ConfigError where there is one kind
-    only, or where the others have only right or only wrong poses."""
-    kinds = np.unique(rows.scenes)
-    if len(kinds) < 2:
-        raise ConfigError(f"cross validation needs two kinds of scene at least, there is {', '.join(kinds)}")
+def held_out_chances(rows: TrainingSet, groups: np.ndarray) -> Floats:
+    """(N,) each by the weights that are fitted to the other groups; groups: (N,), which one each row is in.
+
+    Raises ConfigError where there is one group only, or where the others have only right or only wrong poses.
+    """
+    names = np.unique(groups)
+    if len(names) < 2:
+        raise ConfigError(f"cross validation needs two scenes or objects at least, there is {', '.join(names)}")
     found = np.zeros(len(rows.right))
-    for kind in kinds:
-        out = rows.scenes == kind
+    for name in names:
+        out = groups == name
         weights = fit(rows.measures[~out], rows.right[~out], rows.weights[~out])
         found[out] = chances(rows.measures[out], weights)
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -13,11 +14,14 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from eval.environment import environment
+from eval.track_run import code_fingerprint
 from tracker.confidence import Grounds
 from tracker.errors import ConfigError
 from tracker.frame import Mask
 from tracker.geometry import Floats
 from tracker.whole_file import write_whole
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +38,14 @@ class JudgedPose:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrainingSet:
-    """N rows: their measures (N, M), whether they are right (N,), their weights (N,), and kinds of scene (N,)."""
+    """N rows: their measures (N, M), whether they are right (N,), their weights (N,), and of which kind of scene and
+    which object they are (N,)."""
 
     measures: Floats
     right: Mask
     weights: Floats
     scenes: np.ndarray
+    object_ids: np.ndarray
 
 
 def training_set(poses: Sequence[JudgedPose]) -> TrainingSet:
@@ -55,19 +61,29 @@ def training_set(poses: Sequence[JudgedPose]) -> TrainingSet:
         right=np.array([pose.right for pose in poses], bool),
         weights=np.array([1 / counts[pose.run, pose.object_id] for pose in poses]),
         scenes=np.array([pose.scene for pose in poses]),
+        object_ids=np.array([pose.object_id for pose in poses]),
     )
 
 
 def write_poses(path: Path, protocol: Mapping[str, Any], poses: Sequence[JudgedPose]) -> None:
     """As JSON, whole or not at all. Raises OutputError."""
-    content = {"protocol": dict(protocol), "environment": environment(), "poses": [asdict(pose) for pose in poses]}
+    content = {
+        "protocol": dict(protocol),
+        "code": code_fingerprint(),
+        "environment": environment(),
+        "poses": [asdict(pose) for pose in poses],
+    }
     write_whole(path, json.dumps(content, allow_nan=False) + "\n")
 
 
 def read_poses(path: Path) -> list[JudgedPose]:
-    """Raises ConfigError that names the file where it cannot be read, or is of something else."""
+    """Warns where other code has found the poses: it may have measured what spoke for them in another way.
+
+    Raises ConfigError that names the file where it cannot be read, or is of something else.
+    """
     try:
-        return TypeAdapter(list[JudgedPose]).validate_python(json.loads(path.read_text())["poses"])
+        content = json.loads(path.read_text())
+        poses = TypeAdapter(list[JudgedPose]).validate_python(content["poses"])
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read ({error})") from error
     except ValidationError as error:
@@ -76,3 +92,6 @@ def read_poses(path: Path) -> list[JudgedPose]:
         raise ConfigError(f"{path}: poses.{where}: {first['msg']}; expected what --json wrote") from error
     except (ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"{path}: expected a JSON file that --json wrote, with 'poses' ({error!r})") from error
+    if content.get("code") != code_fingerprint():
+        log.warning("%s: other source code than this has found its poses; track anew for weights of this one", path)
+    return poses

@@ -50,15 +50,17 @@ class Calibrate:
         if self.json:
             require_free(self.json, self.overwrite)
         rows = training_set(read_poses(self.rows) if self.rows else self._collected())
-        weights, held_out = fit(rows.measures, rows.right, rows.weights), held_out_chances(rows)
-        pooled = judge("all, by a fit to the other scenes", held_out, rows.right)
+        weights = fit(rows.measures, rows.right, rows.weights)
+        by_scene, by_object = (held_out_chances(rows, groups) for groups in (rows.scenes, rows.object_ids))
+        pooled = judge("all, by fits to the other scenes", by_scene, rows.right)
         ways = [
             pooled,
+            judge("all, by fits to the other objects", by_object, rows.right),
             judge("all, by this fit", chances(rows.measures, weights), rows.right),
             judge("all, by the weights as they are", chances(rows.measures, WEIGHTS), rows.right),
         ]
         STDERR.print(
-            judgement_table([*judge_by_scene(held_out, rows), *ways], "each kind by a fit to the other scenes")
+            judgement_table([*judge_by_scene(by_scene, rows), *ways], "each kind by a fit to the other scenes")
         )
         STDERR.print(
             reliability_table(pooled.reliability, "confidence by a fit to the other scenes, and what is right")
