@@ -50,7 +50,7 @@ class Options(BaseModel):
     vocabulary: str | None = None
     concepts: int | None = Field(default=None, ge=1)
     views: int | None = Field(default=None, ge=1)
-    masks: Literal["visib", "full"] | None = None
+    masks: Literal["visib", "full", "carried"] | None = None
     poses: Literal["filtered", "raw"] | None = None
 
 

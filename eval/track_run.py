@@ -15,7 +15,7 @@ from eval.environment import package_versions
 from eval.peers import method_kind
 from eval.predict import Protocol
 from reference.vocabulary import VocabularySet
-from tracker.config import TrackerConfig
+from tracker.config import TrackerConfig, parse_config
 from tracker.errors import ConfigError
 from tracker.saliency import BackendOptions, SaliencyBackend, open_backend
 
@@ -36,7 +36,7 @@ class TrackRun:
     dataset: as `eval.datasets` opens it. vocabulary: its name, for the report; vocabularies: what is in it, so that no
     file has to be where a unit is tracked. object_ids: only these. masks: one of `MASKS`. threads: of torch in a
     process; another number may change the last digits of a result. Raises ConfigError where `threads` is no number of
-    threads.
+    threads, or where masks are to be carried and the rest does not allow it.
     """
 
     dataset: str
@@ -59,6 +59,14 @@ class TrackRun:
     def __post_init__(self) -> None:
         if self.threads < 1:
             raise ConfigError(f"--threads: at least one is needed, got {self.threads}")
+        if "carried" in (self.masks, self.config.masks):  # either says so: the run's masks, or a config file
+            if self.masks == "full":
+                raise ConfigError(
+                    "--masks full gives masks of every frame, masks=carried of the config takes one"
+                )
+            config = parse_config({**self.config.model_dump(), "masks": "carried"}, "--masks carried")
+            object.__setattr__(self, "config", config)
+            object.__setattr__(self, "masks", "carried")
 
     @property
     def given_masks(self) -> MaskKind:

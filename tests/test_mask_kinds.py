@@ -22,7 +22,7 @@ from eval.units import units_of
 from tests.tiny_bop import write_bop
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
-from tracker.errors import SourceError
+from tracker.errors import ConfigError, SourceError
 from tracker.frame import Frame
 from tracker.result import TrackResult
 from tracker.saliency import SaliencyBackend
@@ -128,3 +128,13 @@ def test_a_layout_that_knows_no_full_masks_says_what_it_has() -> None:
 
 def test_a_preset_may_ask_for_them() -> None:
     assert Options(masks="full").model_dump(exclude_none=True) == {"masks": "full"}
+
+
+def test_carried_masks_are_the_run_s_and_the_config_s_whoever_says_so() -> None:
+    carried = TrackerConfig(masks="carried")
+    for run in (TrackRun("bop:here", masks="carried"), TrackRun("bop:here", carried)):
+        assert (run.masks, run.config.masks, run.given_masks) == ("carried", "carried", "visib")
+    with pytest.raises(ConfigError, match="--masks full"):
+        TrackRun("bop:here", carried, masks="full")
+    with pytest.raises(ConfigError, match="needs prior=true"):
+        TrackRun("bop:here", TrackerConfig(prior=False), masks="carried")

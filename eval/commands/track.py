@@ -147,13 +147,11 @@ class Track:
     def _run(self) -> TrackRun:
         from eval.track_run import TrackRun
         from reference.vocabulary import read_vocabulary
-        from tracker.config import parse_config, read_config
+        from tracker.config import read_config
 
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
-        if self.masks == "carried":
-            config = parse_config({**config.model_dump(), "masks": "carried"}, "--masks carried")
         return TrackRun(
             dataset=self.dataset,
             config=config,
