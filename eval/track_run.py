@@ -61,9 +61,7 @@ class TrackRun:
             raise ConfigError(f"--threads: at least one is needed, got {self.threads}")
         if "carried" in (self.masks, self.config.masks):  # either says so: the run's masks, or a config file
             if self.masks == "full":
-                raise ConfigError(
-                    "--masks full gives masks of every frame, masks=carried of the config takes one"
-                )
+                raise ConfigError("--masks full gives masks of every frame, masks=carried of the config takes one")
             config = parse_config({**self.config.model_dump(), "masks": "carried"}, "--masks carried")
             object.__setattr__(self, "config", config)
             object.__setattr__(self, "masks", "carried")

@@ -30,8 +30,8 @@ ORDER = {
         "region", "reference_views",
         "grounding", "symmetry", "declared_symmetry", "concept", "measures", "matching", "appearance",
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
-        "camera_motion", "silhouette", "proposals", "verification", "refinement", "confidence", "pose_filter", "config",
-        "result", "smoothing", "stopwatch", "search", "looking", "track", "pipeline", "output",
+        "camera_motion", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
+        "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "track", "pipeline", "output",
         "viewer", "terminal", "__main__",
     ),
     "reference": (

@@ -12,12 +12,13 @@ from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import Frame
-from tracker.geometry import Floats, Pose
+from tracker.geometry import Pose
 from tracker.looking import Asking, Found, Look, Looking
 from tracker.pose_filter import PoseFilter
 from tracker.proposals import Proposals
 from tracker.result import Surface, TrackResult, TrackState
 from tracker.stopwatch import Stopwatch
+from tracker.whereabouts import Whereabouts
 
 logger = logging.getLogger(__name__)
 
@@ -36,10 +37,7 @@ class Track:
         self._proposals = Proposals(model, config.proposals, config.matching, config.torch_device)
         self._filter = PoseFilter(config.filter)
         self._state = TrackState.INITIALISING
-        # In the camera coordinates of the last frame: where it was believed to be last, and where it may be seen again.
-        self._last: Pose | None = None
-        self._suspected: Pose | None = None
-        self._pointed_out_m: Floats | None = None  # and where it was said to be, but could not be told
+        self._where = Whereabouts()
         self._frames_lost = 0
 
     @property
@@ -53,7 +51,7 @@ class Track:
     def place(self, T_cam_obj: Pose, stamp_ns: int) -> None:
         information = np.diag([PLACED_SIGMA_RAD**-2] * 3 + [PLACED_SIGMA_M**-2] * 3)
         self._filter.start(T_cam_obj, information, stamp_ns)
-        self._last = T_cam_obj
+        self._where.found(T_cam_obj)
 
     def step(self, frame: Frame, camera: CameraMotion, clock: Stopwatch) -> Asking[TrackResult]:
         # 1. Is it where it is said, or expected, to be?
@@ -63,14 +61,16 @@ class Track:
         if self._carried and not self._believed(found) and self._search_due(frame):
             elsewhere = yield from self._anywhere(frame, clock)
             if self._believed(elsewhere, anywhere=True):
-                self._carry(camera, elsewhere.hypothesis.refined.T_cam_obj)
+                self._where.carry(camera, elsewhere.hypothesis.refined.T_cam_obj)
                 return self._lost(frame, "seen again: the next frame has to confirm it", clock)
 
         # 3. What does that say about its pose, given where it has been?
         if self._believed(found):
             return self._tracked(frame, found, clock)
-        self._carry(camera, None)
-        self._keep_in_mind(frame)
+        if self._carried:
+            self._where.carry(camera)
+            if (mask := frame.masks.get(self._model.object_id)) is not None:
+                self._where.point_out(mask, frame)
         return self._lost(frame, self._why_not(found), clock)
 
     @staticmethod
@@ -79,25 +79,6 @@ class Track:
             return found
         judged = f"explains {found.score:.2f} of it" if found.masked else f"is right at {found.confidence:.0%}"
         return f"poor fit: the best pose {judged}"
-
-    def _carry(self, camera: CameraMotion, suspected: Pose | None) -> None:
-        """Take where it was along with the camera, and where it may be, until it is found."""
-        self._suspected = suspected
-        if (
-            not self._carried
-            or (self._last is None and self._pointed_out_m is None)
-            or not (moved := camera.from_last())
-        ):
-            return
-        self._last = None if self._last is None else moved @ self._last
-        self._pointed_out_m = None if self._pointed_out_m is None else (moved @ self._pointed_out_m[None])[0]
-
-    def _keep_in_mind(self, frame: Frame) -> None:
-        """Where a mask says that it is, though it cannot be told there yet."""
-        mask = frame.masks.get(self._model.object_id)
-        if mask is not None and (shown := np.argwhere(mask & (frame.depth_m > 0))).size:
-            points = frame.intrinsics.unproject(shown[:, 1], shown[:, 0], frame.depth_m[*shown.T].astype(np.float64))
-            self._pointed_out_m = np.median(points, axis=0)
 
     @property
     def _carried(self) -> bool:
@@ -112,13 +93,12 @@ class Track:
             yield Look(mask, predicted, expected, masked=True) if mask.any() else "out of view: the mask is empty"
         elif not self._carried:
             yield f"no mask of object {self._model.object_id!r} was given"
-        elif self._last is None and self._suspected is None:
-            if self._pointed_out_m is None:
-                yield "not seen yet"
-            else:
-                yield Look(self._proposals.around(self._pointed_out_m, frame), None)
-        else:
+        elif self._where.known:
             yield from self._where_it_may_be(self._expected(predicted, camera), frame, clock)
+        elif self._where.pointed_out_m is not None:
+            yield Look(self._proposals.around(self._where.pointed_out_m, frame), None)
+        else:
+            yield "not seen yet"
 
     def _where_it_may_be(self, expected: Iterable[Pose], frame: Frame, clock: Stopwatch) -> Iterator[Look | str]:
         """Near each pose; if it is clearly at none of them, anywhere around the first."""
@@ -140,10 +120,7 @@ class Track:
         """Where it is if it moves on as it did; where it is if it stands still and the camera moved."""
         if predicted is not None and self._state is TrackState.TRACKING:
             yield predicted
-        for last in (self._suspected, self._last):
-            if last is not None:
-                moved = camera.from_last()
-                yield last if moved is None else moved @ last
+        yield from self._where.expected(camera)
 
     def _same(self, a: Pose, b: Pose) -> bool:
         return a.angle_to_rad(b) < SAME_RAD and a.distance_to_m(b) < SAME_SHARE * self._model.diameter_m
@@ -180,8 +157,8 @@ class Track:
             filtered = self._filter.update(raw, information, frame.stamp_ns) if self._config.prior else None
             if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
                 filtered = self._filter.start(raw, information, frame.stamp_ns)
-        self._state, self._last, self._suspected, self._frames_lost = TrackState.TRACKING, raw, None, 0
-        self._pointed_out_m = None
+        self._state, self._frames_lost = TrackState.TRACKING, 0
+        self._where.found(raw)
         view = found.hypothesis.view
         return TrackResult(
             stamp_ns=frame.stamp_ns,
