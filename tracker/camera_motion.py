@@ -20,34 +20,43 @@ from tracker.registration import RegistrationConfig, register_pairs
 
 FEATURES, CORNER_CONTRAST = 800, 8
 LEAST_FEATURES = 20  # that match: fewer say nothing about a room
-LEAST_SHARE = 0.3  # of them that move alike: the room, not a hand in front of it
+LEAST_SHARE = 0.15  # of them that move alike: chance does not bring so many together
 ROOM_M = 0.5  # the edges of a sample are at least a share of this long
 SAMPLING = RegistrationConfig(threshold_m=0.02, samples=20_000, candidates=1, seeding_below=0)
 
 
 class CameraMotion:
-    """Between the last frame and this one; worked out when it is asked for, once for all objects."""
+    """From earlier frames to this one; worked out when it is asked for, once for all objects."""
 
     def __init__(self) -> None:
-        self._last: _Landmarks | None = None
-        self._now: _Landmarks | None = None
-        self._motion: Pose | None = None
-        self._asked = False
+        self._now: Landmarks | None = None
+        self._last: Landmarks | None = None
+        self._known: dict[int, tuple[Landmarks, Pose | None]] = {}
+
+    @property
+    def now(self) -> Landmarks | None:
+        """This frame's, to ask for the motion since then in later ones."""
+        return self._now
 
     def advance(self, frame: Frame) -> None:
         """The next frame is here."""
-        self._last, self._now, self._asked = self._now, _Landmarks(frame), False
+        self._last, self._now, self._known = self._now, Landmarks(frame), {}
 
     def from_last(self) -> Pose | None:
-        """T_now_last, camera coordinates of the last frame -> of this one, by what most of the picture did; None where
-        that cannot be said: too little to go by, or too little of it agrees."""
-        if not self._asked:
-            self._asked = True
-            self._motion = _motion(self._last, self._now) if self._last and self._now else None
-        return self._motion
+        """T_now_last, as `since` the frame before this one."""
+        return self.since(self._last)
+
+    def since(self, then: Landmarks | None) -> Pose | None:
+        """T_now_then, camera coordinates of an earlier frame -> of this one, by what most of the picture did; None
+        where that cannot be said: too little to go by, or too little of it agrees."""
+        if then is None or self._now is None:
+            return None
+        if id(then) not in self._known:
+            self._known[id(then)] = (then, Pose.identity() if then is self._now else _motion(then, self._now))
+        return self._known[id(then)][1]
 
 
-class _Landmarks:
+class Landmarks:
     """Corners of a frame that have depth. ORB, Rublee et al., ICCV 2011."""
 
     def __init__(self, frame: Frame) -> None:
@@ -67,7 +76,7 @@ class _Landmarks:
         return points, np.asarray(descriptors, np.uint8)[measured]
 
 
-def _motion(last: _Landmarks, now: _Landmarks) -> Pose | None:
+def _motion(last: Landmarks, now: Landmarks) -> Pose | None:
     (points_last, was), (points_now, is_now) = last.found, now.found
     if min(len(was), len(is_now)) < LEAST_FEATURES:
         return None

@@ -79,7 +79,10 @@ class Looking:
             return self._silhouette(T_cam_obj, frame, known=False)
 
     def _better(self, seen: Found, best: Found) -> bool:
-        """Objects seldom jump: what is found anywhere has to be clearly better than what is found where expected."""
+        """Objects seldom jump: what is found anywhere has to be clearly better than what is found where expected. Where
+        no pixels are known to be the object's, a confidence knows that."""
+        if not seen.masked:
+            return seen.confidence > best.confidence
         jumps = seen.hypothesis.origin == "search" != best.hypothesis.origin and best.score >= self._config.accept
         return seen.score > best.score + (self._config.jump if jumps else 0.0)
 

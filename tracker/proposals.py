@@ -72,9 +72,10 @@ class Proposals:
         worth = np.array([votes[near].sum() for near in around])
         return [self.around(centre, picture.frame) for centre in self._apart(centres, worth)]
 
-    def around(self, centre: Floats, frame: Frame) -> Mask:
-        """(H, W) bool, pixels whose points lie within the radius of a place (3,), metres, camera coordinates."""
-        camera, radius_m = frame.intrinsics, self._config.radius * self._diameter_m
+    def around(self, centre: Floats, frame: Frame, more: float = 0.0) -> Mask:
+        """(H, W) bool, pixels whose points lie within the radius of a place (3,), metres, camera coordinates. more: so
+        many diameters farther."""
+        camera, radius_m = frame.intrinsics, (self._config.radius + more) * self._diameter_m
         reach_px = radius_m * camera.fx / max(centre[2] - radius_m, 0.1)
         column, row = centre[0] / centre[2] * camera.fx + camera.cx, centre[1] / centre[2] * camera.fy + camera.cy
         x0, x1 = (int(np.clip(x, 0, camera.width)) for x in (column - reach_px, column + reach_px + 1))

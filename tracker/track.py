@@ -24,7 +24,7 @@ logger = logging.getLogger(__name__)
 
 PLACED_SIGMA_RAD, PLACED_SIGMA_M = 0.1, 0.01  # how surely an object is where `place` says
 SAME_RAD, SAME_SHARE = 0.05, 0.03  # poses nearer than this angle and share of the diameter are looked at once
-
+MOVED_ON = 0.4  # diameters that it may have moved while nobody saw it
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
 
 
@@ -36,6 +36,7 @@ class Track:
         self._look = Looking(model, config)
         self._proposals = Proposals(model, config.proposals, config.matching, config.torch_device)
         self._filter = PoseFilter(config.filter)
+        self._centre_m = model.points.mean(axis=0)
         self._state = TrackState.INITIALISING
         self._where = Whereabouts()
         self._frames_lost = 0
@@ -51,7 +52,7 @@ class Track:
     def place(self, T_cam_obj: Pose, stamp_ns: int) -> None:
         information = np.diag([PLACED_SIGMA_RAD**-2] * 3 + [PLACED_SIGMA_M**-2] * 3)
         self._filter.start(T_cam_obj, information, stamp_ns)
-        self._where.found(T_cam_obj)
+        self._where.told(T_cam_obj)
 
     def step(self, frame: Frame, camera: CameraMotion, clock: Stopwatch) -> Asking[TrackResult]:
         # 1. Is it where it is said, or expected, to be?
@@ -66,11 +67,11 @@ class Track:
 
         # 3. What does that say about its pose, given where it has been?
         if self._believed(found):
-            return self._tracked(frame, found, clock)
+            return self._tracked(frame, found, camera, clock)
         if self._carried:
             self._where.carry(camera)
             if (mask := frame.masks.get(self._model.object_id)) is not None:
-                self._where.point_out(mask, frame)
+                self._where.point_out(mask, frame, camera)
         return self._lost(frame, self._why_not(found), clock)
 
     @staticmethod
@@ -95,26 +96,21 @@ class Track:
             yield f"no mask of object {self._model.object_id!r} was given"
         elif self._where.known:
             yield from self._where_it_may_be(self._expected(predicted, camera), frame, clock)
-        elif self._where.pointed_out_m is not None:
-            yield Look(self._proposals.around(self._where.pointed_out_m, frame), None)
+        elif (place_m := self._where.pointed_out_m(camera)) is not None:
+            yield Look(self._proposals.around(place_m, frame), None)
         else:
             yield "not seen yet"
 
     def _where_it_may_be(self, expected: Iterable[Pose], frame: Frame, clock: Stopwatch) -> Iterator[Look | str]:
         """Near each pose; if it is clearly at none of them, anywhere around the first."""
         near: list[Pose] = []
-        looked: list[Look] = []
         for pose in expected:
             if not any(self._same(pose, other) for other in near):
                 near.append(pose)
                 outline = self._look.outline(pose, frame, clock)
-                if isinstance(outline, str):
-                    yield outline
-                else:
-                    looked.append(Look(outline, pose, tuple(near), alone=True))
-                    yield looked[-1]
-        if looked:
-            yield Look(looked[0].mask, None, tuple(near))
+                yield outline if isinstance(outline, str) else Look(outline, pose, tuple(near), alone=True)
+        around = self._proposals.around((near[0] @ self._centre_m[None])[0], frame, MOVED_ON)
+        yield Look(around, None, tuple(near))
 
     def _expected(self, predicted: Pose | None, camera: CameraMotion) -> Iterator[Pose]:
         """Where it is if it moves on as it did; where it is if it stands still and the camera moved."""
@@ -148,7 +144,7 @@ class Track:
     def _search_due(self, frame: Frame) -> bool:
         return self._model.object_id not in frame.masks and self._frames_lost % self._config.search_every == 0
 
-    def _tracked(self, frame: Frame, found: Found, clock: Stopwatch) -> TrackResult:
+    def _tracked(self, frame: Frame, found: Found, camera: CameraMotion, clock: Stopwatch) -> TrackResult:
         with clock("filter"):
             predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
             refined = found.hypothesis.refined
@@ -158,7 +154,7 @@ class Track:
             if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
                 filtered = self._filter.start(raw, information, frame.stamp_ns)
         self._state, self._frames_lost = TrackState.TRACKING, 0
-        self._where.found(raw)
+        self._where.found(raw, camera)
         view = found.hypothesis.view
         return TrackResult(
             stamp_ns=frame.stamp_ns,
