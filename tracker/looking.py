@@ -59,7 +59,7 @@ class Looking:
         self._search = Search(model, config)
         self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
         self._without_concepts = 0  # looks in a row that did without
-        self._score = 1.0  # of what was found last
+        self._score = 0.0  # of what was found last; 1 while it is lost, so that no place is passed over
 
     def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
         """The best of what the looks find, no further than the first that leaves no doubt; or why there is nothing."""

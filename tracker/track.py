@@ -61,7 +61,7 @@ class Track:
         # 2. If not, is it anywhere in the picture? That takes a second frame to be believed.
         if self._carried and not self._believed(found) and self._search_due(frame):
             elsewhere = yield from self._anywhere(frame, clock)
-            if self._believed(elsewhere, anywhere=True):
+            if self._believed(elsewhere):
                 self._where.carry(camera, elsewhere.hypothesis.refined.T_cam_obj)
                 return self._lost(frame, "seen again: the next frame has to confirm it", clock)
 
@@ -130,15 +130,16 @@ class Track:
             masks = self._proposals.masks(picture, saliency, self._config.cloud)
         return (yield from self._look.best((Look(mask, None) for mask in masks), frame, clock))
 
-    def _believed(self, found: Found | str, *, anywhere: bool = False) -> TypeGuard[Found]:
+    def _believed(self, found: Found | str) -> TypeGuard[Found]:
         """Of pixels that are said to be the object's a pose has to explain enough. Elsewhere it has to be likely: less
-        is asked of what is being tracked than of what is seen again, so that a state does not flicker."""
+        is asked where it was expected while it is tracked than of what is seen again or has jumped, so that a state
+        does not flicker."""
         if isinstance(found, str):
             return False
         if found.masked:
             return found.score >= self._config.accept
-        tracking = self._state is TrackState.TRACKING and not anywhere
-        likely = found.confidence >= (self._config.believe if tracking else self._config.regain)
+        goes_on = self._state is TrackState.TRACKING and found.hypothesis.origin != "search"
+        likely = found.confidence >= (self._config.believe if goes_on else self._config.regain)
         return likely and found.hypothesis.evidence.surface >= LEAST_SURFACE
 
     def _search_due(self, frame: Frame) -> bool:
