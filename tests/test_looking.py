@@ -24,7 +24,7 @@ class Counted:
     def __init__(self, model: ConceptModel, backend: SaliencyBackend, config: TrackerConfig) -> None:
         self.asked, self.seen = 0, 0
         self._model, self._backend = model, backend
-        self._looking = Looking(model, config)
+        self.looking = Looking(model, config)
 
     def __call__(self, looks: list[Look | str], frame: Frame) -> Found | str:
         def counted():
@@ -32,7 +32,7 @@ class Counted:
                 self.seen += 1
                 yield look
 
-        asking = self._looking.best(counted(), frame, Stopwatch())
+        asking = self.looking.best(counted(), frame, Stopwatch())
         try:
             view = next(asking)
             while True:
@@ -63,9 +63,29 @@ def test_the_first_place_without_doubt_is_the_last_that_is_looked_at(
     assert can_looking.seen == 2
 
 
-def test_where_nothing_is_the_last_word_is_the_reason(can_looking: Counted, can_frames: list[Frame]) -> None:
-    assert can_looking(["out of view", "hidden"], can_frames[0]) == "hidden"
+def test_where_nothing_is_the_first_place_says_why(can_looking: Counted, can_frames: list[Frame]) -> None:
+    assert can_looking(["hidden", "out of view"], can_frames[0]) == "hidden"
     assert can_looking([], can_frames[0]) == "nothing in the picture looks like it"
+
+
+def test_what_is_found_elsewhere_knows_why_it_was_missed(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    look = Look(can_frames[0].masks[CAN], None, masked=True)
+    for looks, missed in ((["hidden", "out of view", look], "hidden"), ([look, "hidden"], "")):
+        found = can_looking(looks, can_frames[0])
+        assert_at(found, can_truth)
+        assert isinstance(found, Found)
+        assert found.missed == missed
+
+
+def test_while_it_is_lost_no_place_is_passed_over(can_looking: Counted, can_frames: list[Frame]) -> None:
+    look = Look(can_frames[0].masks[CAN], None, masked=True)
+    for score, seen in ((0.7, 1), (None, 2), (0.7, 1)):
+        can_looking.seen = 0
+        can_looking.looking.came_of_it(score)
+        assert isinstance(can_looking([look, "hidden"], can_frames[0]), Found)
+        assert can_looking.seen == seen
 
 
 def test_concepts_are_asked_for_once_in_so_many_looks(

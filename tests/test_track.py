@@ -68,6 +68,14 @@ def test_there_is_no_pose_of_what_is_hidden_or_out_of_view(leaving: SyntheticSce
         assert (result.pose is None) == (result.state is not TrackState.TRACKING), k
 
 
+def test_the_reason_says_what_became_of_it(leaving: SyntheticScene, left: list[TrackResult]) -> None:
+    gone = [s.index for s in leaving.sightings(CAN) if s.visible_px == 0]
+    first, second = (part for part in np.split(gone, np.flatnonzero(np.diff(gone) > 1) + 1))
+    for stretch, word in ((first, "hidden"), (second, "out of view")):
+        reasons = [left[k].reason for k in stretch[2:-2]]
+        assert sum(word in reason for reason in reasons) > 0.6 * len(reasons), reasons
+
+
 def test_what_was_hidden_and_what_was_out_of_view_is_found_again(
     leaving: SyntheticScene, left: list[TrackResult]
 ) -> None:

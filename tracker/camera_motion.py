@@ -1,4 +1,4 @@
-"""How the camera moved between two frames, by what stands still in both.
+"""How the camera moved since an earlier frame, by what stands still in both.
 
 A jerk of the camera moves all objects that lie still alike, whatever each of them did before: where the expectation of
 an object's own motion fails, this one often holds.
@@ -31,7 +31,7 @@ class CameraMotion:
     def __init__(self) -> None:
         self._now: Landmarks | None = None
         self._last: Landmarks | None = None
-        self._known: dict[int, tuple[Landmarks, Pose | None]] = {}
+        self._known: dict[Landmarks, Pose | None] = {}  # by identity
 
     @property
     def now(self) -> Landmarks | None:
@@ -51,9 +51,9 @@ class CameraMotion:
         where that cannot be said: too little to go by, or too little of it agrees."""
         if then is None or self._now is None:
             return None
-        if id(then) not in self._known:
-            self._known[id(then)] = (then, Pose.identity() if then is self._now else _motion(then, self._now))
-        return self._known[id(then)][1]
+        if then not in self._known:
+            self._known[then] = Pose.identity() if then is self._now else _motion(then, self._now)
+        return self._known[then]
 
 
 class Landmarks:
@@ -76,14 +76,14 @@ class Landmarks:
         return points, np.asarray(descriptors, np.uint8)[measured]
 
 
-def _motion(last: Landmarks, now: Landmarks) -> Pose | None:
-    (points_last, was), (points_now, is_now) = last.found, now.found
+def _motion(then: Landmarks, now: Landmarks) -> Pose | None:
+    (points_then, was), (points_now, is_now) = then.found, now.found
     if min(len(was), len(is_now)) < LEAST_FEATURES:
         return None
     matches = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True).match(was, is_now)
     if len(matches) < LEAST_FEATURES:
         return None
-    before = torch.from_numpy(points_last[[m.queryIdx for m in matches]]).float()
+    before = torch.from_numpy(points_then[[m.queryIdx for m in matches]]).float()
     after = torch.from_numpy(points_now[[m.trainIdx for m in matches]]).float()
     none = torch.zeros_like(before)
     found = register_pairs(Pairs(after, none, before, none), ROOM_M, SAMPLING, torch.Generator().manual_seed(0))

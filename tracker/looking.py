@@ -14,7 +14,6 @@ from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
 from tracker.saliency import Saliency
 from tracker.search import Hypothesis, Search, Sight
-from tracker.silhouette import Silhouette
 from tracker.stopwatch import Stopwatch
 from tracker.view import ObjectView, view_object
 
@@ -26,25 +25,26 @@ Asking = Generator[ObjectView, Saliency, T]  # asks for the saliency of a view, 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. alone:
-    not for any other, even where it is not clearly there. masked: the pixels are known to be the object's. expected:
-    all poses that the object was expected at."""
+    """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. expected:
+    all poses that the object was expected at. masked: the pixels are known to be the object's; then it is looked for
+    in any pose too, where it is not clearly near the start."""
 
     mask: Mask
     start: Pose | None
     expected: Sequence[Pose] = ()
-    alone: bool = False
     masked: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """A pose, and what speaks for it. masked: by pixels that are known to be the object's."""
+    """A pose, and what speaks for it. masked: by pixels that are known to be the object's. missed: why it did not even
+    show at the first place where it was looked for; empty where something did."""
 
     hypothesis: Hypothesis
     grounds: Grounds
     confidence: float
     masked: bool
+    missed: str = ""
 
     @property
     def score(self) -> float:
@@ -57,34 +57,33 @@ class Looking:
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
         self._search = Search(model, config)
-        self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
         self._without_concepts = 0  # looks in a row that did without
-        self._score = 0.0  # of what was found last; 1 while it is lost, so that no place is passed over
+        self._usual = 0.0  # score of what was believed last
 
     def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
-        """The best of what the looks find, no further than the first that leaves no doubt; or why there is nothing."""
-        best: Found | str = "nothing in the picture looks like it"
+        """The likeliest of what the looks find, no further than the first that leaves no doubt; or why there is
+        nothing: what was said of the first place."""
+        best, missed = None, ""
         for look in looks:
             seen = look if isinstance(look, str) else (yield from self._seen(look, frame, clock))
-            if isinstance(best, str) or (not isinstance(seen, str) and self._better(seen, best)):
+            if isinstance(seen, str):
+                missed = missed if missed or best else seen
+            elif best is None or seen.confidence > best.confidence:
                 best = seen
-            if not isinstance(best, str) and self._clear(best):
+            if best and self._clear(best):
                 break
-        self._score = 1.0 if isinstance(best, str) else best.score
-        return best
+        if best is None:
+            return missed or "nothing in the picture looks like it"
+        return replace(best, missed=missed)
+
+    def came_of_it(self, score: float | None) -> None:
+        """The score of what was believed, None where the object is lost: next time every place is looked at then."""
+        self._usual = 1.0 if score is None else score
 
     def outline(self, T_cam_obj: Pose, frame: Frame, clock: Stopwatch) -> Mask | str:
-        """Where an object shows that is about at this pose, or why it does not."""
+        """See `Search.outline`."""
         with clock("mask"):
-            return self._silhouette(T_cam_obj, frame, known=False)
-
-    def _better(self, seen: Found, best: Found) -> bool:
-        """Objects seldom jump: what is found anywhere has to be clearly better than what is found where expected. Where
-        no pixels are known to be the object's, a confidence knows that."""
-        if not seen.masked:
-            return seen.confidence > best.confidence
-        jumps = seen.hypothesis.origin == "search" != best.hypothesis.origin and best.score >= self._config.accept
-        return seen.score > best.score + (self._config.jump if jumps else 0.0)
+            return self._search.outline(T_cam_obj, frame)
 
     def _seen(self, look: Look, frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
         with clock("view"):
@@ -103,15 +102,15 @@ class Looking:
             cloud = lift(view, saliency, self._config.cloud)
         if len(cloud) < LEAST_POINTS:
             return f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
-        if look.alone and look.start is not None:
+        if look.start is not None and not look.masked:
             hypothesis = self._search.near(look.start, sight, cloud, clock)
         else:
             hypothesis = self._search(sight, cloud, look.start, clock)
         return self._found(hypothesis, look) or "poor fit: no pose explains what is seen"
 
     def _clear(self, found: Found) -> bool:
-        """Whether nothing better is to be expected: it fits well, and not much worse than the last time."""
-        return found.score >= max(self._config.trust, self._score - self._config.jump)
+        """Whether nothing better is to be expected: it fits well, and not much worse than it did."""
+        return found.score >= max(self._config.trust, self._usual - self._config.jump)
 
     def _sure(self, continued: Found) -> bool:
         """Whether concepts could say nothing new, as it is clearly where it was expected. Surface and colours alone let

@@ -12,6 +12,7 @@ from tracker.closest_points import ClosestPoints
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
+from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
 from tracker.matching import Correspondences, Matcher
 from tracker.refinement import Refined, Refiner
@@ -65,6 +66,10 @@ class Search:
         if found is None or found.evidence.score < self._config.trust:
             found = preferred(found, self.anywhere(sight, cloud, clock), self._config)
         return found
+
+    def outline(self, T_cam_obj: Pose, frame: Frame) -> Mask | str:
+        """(H, W) bool, where an object shows that is about at this pose, or why it does not."""
+        return self._silhouette(T_cam_obj, frame, known=False)
 
     def continued(self, predicted: Pose, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
         """The pose that surface and colours lead to from the prediction, without any concept."""
@@ -135,11 +140,9 @@ class Search:
         view, appearance = sight.view, sight.appearance
         if not sight.masked:
             mask = self._silhouette(refined.T_cam_obj, view.frame, known=True)
-            own = (
-                None
-                if isinstance(mask, str)
-                else view_object(view.frame, mask, self._model.diameter_m, self._config.view)
-            )
+            if isinstance(mask, str):
+                return None
+            own = view_object(view.frame, mask, self._model.diameter_m, self._config.view)
             if own is None:
                 return None
             view, appearance = own, view_appearance(own)

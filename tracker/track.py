@@ -78,6 +78,8 @@ class Track:
     def _why_not(found: Found | str) -> str:
         if isinstance(found, str):
             return found
+        if found.missed:
+            return found.missed
         judged = f"explains {found.score:.2f} of it" if found.masked else f"is right at {found.confidence:.0%}"
         return f"poor fit: the best pose {judged}"
 
@@ -102,13 +104,13 @@ class Track:
             yield "not seen yet"
 
     def _where_it_may_be(self, expected: Iterable[Pose], frame: Frame, clock: Stopwatch) -> Iterator[Look | str]:
-        """Near each pose; if it is clearly at none of them, anywhere around the first."""
+        """Near each pose, of which there is one at least; where it is clearly at none, anywhere around the first."""
         near: list[Pose] = []
         for pose in expected:
             if not any(self._same(pose, other) for other in near):
                 near.append(pose)
                 outline = self._look.outline(pose, frame, clock)
-                yield outline if isinstance(outline, str) else Look(outline, pose, tuple(near), alone=True)
+                yield outline if isinstance(outline, str) else Look(outline, pose, tuple(near))
         around = self._proposals.around((near[0] @ self._centre_m[None])[0], frame, MOVED_ON)
         yield Look(around, None, tuple(near))
 
@@ -155,6 +157,7 @@ class Track:
             if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
                 filtered = self._filter.start(raw, information, frame.stamp_ns)
         self._state, self._frames_lost = TrackState.TRACKING, 0
+        self._look.came_of_it(found.score)
         self._where.found(raw, camera)
         view = found.hypothesis.view
         return TrackResult(
@@ -177,6 +180,7 @@ class Track:
         if self._state is TrackState.TRACKING:
             logger.info("object %r lost at frame %d: %s", self._model.object_id, frame.index, reason)
             self._state = TrackState.LOST
+            self._look.came_of_it(None)
         return TrackResult(
             stamp_ns=frame.stamp_ns,
             object_id=self._model.object_id,
