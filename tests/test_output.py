@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields
+from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ import pytest
 from tracker.confidence import Grounds
 from tracker.errors import OutputError, SourceError
 from tracker.geometry import Pose
-from tracker.output import as_json_line, require_free, result_folder
+from tracker.output import PoseLines, as_json_line, require_free, result_folder
 from tracker.result import TrackResult, TrackState
 from tracker.verification import Evidence
 
@@ -141,3 +143,29 @@ def test_a_lost_frame_has_a_reason_and_no_pose_at_all() -> None:
     assert (content["state"], content["reason"], content["confidence"]) == ("lost", "out of view", 0)
     for name in ("T_cam_obj", "T_cam_obj_raw", "covariance", "evidence"):
         assert content[name] is None
+
+
+def lines_of(text: StringIO) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.getvalue().splitlines()]
+
+
+def test_lines_go_to_every_text_as_they_come() -> None:
+    texts = [StringIO(), StringIO()]
+    lines = PoseLines(texts, {"mug": {}})
+    lines.add(4, TRACKED)
+    assert [line["frame"] for line in lines_of(texts[0])] == [4]
+    lines.add(5, LOST)
+    lines.finish()
+    assert lines_of(texts[0]) == lines_of(texts[1])
+    assert [(line["frame"], line["state"]) for line in lines_of(texts[0])] == [(4, "tracking"), (5, "lost")]
+
+
+def test_smoothed_lines_come_at_the_end_and_once() -> None:
+    text = StringIO()
+    lines = PoseLines([text], {"mug": {}}, smooth="offline")
+    for frame_index, result in ((4, TRACKED), (5, LOST)):
+        lines.add(frame_index, result)
+    assert text.getvalue() == ""
+    lines.finish()
+    lines.finish()
+    assert [(line["frame"], line["state"]) for line in lines_of(text)] == [(4, "tracking"), (5, "lost")]

@@ -5,14 +5,17 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from rich.table import Table
 
 from tracker.terminal import STDERR, progress, run
+
+if TYPE_CHECKING:
+    from tracker.config import TrackerConfig
 
 
 @dataclass
@@ -52,27 +55,17 @@ class Track:
 
     def __call__(self) -> None:
         from tracker.concept import ConceptModel
-        from tracker.config import dump_config, parse_config, read_config
+        from tracker.config import dump_config
         from tracker.errors import ConfigError, TrackerError
         from tracker.first_masks import FirstMasks
         from tracker.in_order import InOrder
-        from tracker.output import as_json_line, result_folder
+        from tracker.output import PoseLines, result_folder
         from tracker.pipeline import ObjectTracker
-        from tracker.result import TrackResult
         from tracker.saliency import BackendOptions, open_backend
-        from tracker.smoothing import smooth_results
         from tracker.sources import open_source
         from tracker.viewer import NullViewer, OverlayVideo
 
-        if self.view != "none" and self.out is None:
-            raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
-        config = read_config(self.config)
-        if self.prior is not None:
-            config = config.model_copy(update={"prior": self.prior == "on"})
-        if self.masks is not None:
-            config = parse_config({**config.model_dump(), "masks": self.masks}, f"--masks {self.masks}")
-        if self.smooth != "off" and not config.prior:
-            raise ConfigError(f"--smooth {self.smooth} smooths what is followed through time: it needs --prior on")
+        config = self._config()
         if not self.model:
             raise ConfigError("--model: at least one concept model is needed; python -m reference makes one")
         models = [ConceptModel.load(path) for path in self.model]
@@ -84,45 +77,49 @@ class Track:
         failure: TrackerError | None = None
         with ExitStack() as stack:
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
-            lines = stack.enter_context((folder / "poses.jsonl").open("w")) if folder else None
             viewer = OverlayVideo(folder / "overlay.mp4", models) if folder and self.view == "overlay" else NullViewer()
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
             frames = InOrder(source if self.quiet or self.json else progress(source, len(source), "tracking"))
-            held: list[tuple[int, TrackResult]] = []
-
-            def write(frame_index: int, result: TrackResult) -> None:
-                seen = {c: r and result.locate(r) for c, r in regions[result.object_id].items()}
-                line = as_json_line(result, frame_index, seen)
-                if lines:
-                    lines.write(line + "\n")
-                if self.json:
-                    print(line, flush=True)
-
+            texts = [sys.stdout] if self.json else []
+            if folder:
+                texts.append(stack.enter_context((folder / "poses.jsonl").open("w")))
+            lines = PoseLines(texts, regions, self.smooth)
             try:
                 for frame in frames:
                     results = tracker.step(frame if config.masks == "given" else first_masks(frame))
                     viewer.show(frame, results, {})
                     for result in results:
                         summary.add(result.object_id, result.state.value, result.timings_ms["total"])
-                        if self.smooth == "off":
-                            write(frame.index, result)
-                        else:  # a depth picture of every frame is held only where it is asked for
-                            held.append((frame.index, result if self.locate else replace(result, surface=None)))
+                        lines.add(frame.index, result)
             except KeyboardInterrupt:
                 STDERR.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error
-            indices, results = [index for index, _ in held], [result for _, result in held]
-            for frame_index, result in zip(indices, smooth_results(results), strict=True):
-                write(frame_index, result)
+            lines.finish()
         if frames.refused:
             STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
         if failure:
             raise failure
         if not self.quiet and not self.json:
             STDERR.print(summary.table())
+
+    def _config(self) -> TrackerConfig:
+        """Raises ConfigError where what is asked for does not go together."""
+        from tracker.config import parse_config, read_config
+        from tracker.errors import ConfigError
+
+        if self.view != "none" and self.out is None:
+            raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
+        config = read_config(self.config)
+        if self.prior is not None:
+            config = config.model_copy(update={"prior": self.prior == "on"})
+        if self.masks is not None:
+            config = parse_config({**config.model_dump(), "masks": self.masks}, f"--masks {self.masks}")
+        if self.smooth != "off" and not config.prior:
+            raise ConfigError(f"--smooth {self.smooth} smooths what is followed through time: it needs --prior on")
+        return config
 
 
 @dataclass

@@ -1,19 +1,21 @@
-"""Result folders that are whole or absent."""
+"""Result folders that are whole or absent, and poses as lines of JSON."""
 
 from __future__ import annotations
 
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from tracker.errors import OutputError
 from tracker.geometry import Pose
-from tracker.region import SeenRegion
+from tracker.region import Region, SeenRegion
 from tracker.result import TrackResult
+from tracker.smoothing import smooth_results
 
 
 @contextmanager
@@ -55,6 +57,40 @@ def require_free(path: Path, overwrite: bool) -> None:
         raise OutputError(f"{path} exists already; give another name, or --overwrite")
     if path.is_dir() and any(path.iterdir()) and not overwrite:
         raise OutputError(f"{path} holds results already; give another folder, or --overwrite")
+
+
+class PoseLines:
+    """Results as lines of JSON in one or several texts: as they come, or, smoothed, all at the end.
+
+    regions: of every object, where on it concepts are, to be said in every line. smooth: "offline" waits for `finish`.
+    """
+
+    def __init__(
+        self, texts: Sequence[TextIO], regions: Mapping[str, Mapping[str, Region | None]], smooth: str = "off"
+    ) -> None:
+        self._texts, self._regions, self._smooth = texts, regions, smooth
+        self._held: list[tuple[int, TrackResult]] = []
+
+    def add(self, frame_index: int, result: TrackResult) -> None:
+        if self._smooth == "off":
+            self._write(frame_index, result)
+        else:  # the depth picture of every frame is held only where it is asked for
+            asked = bool(self._regions[result.object_id])
+            self._held.append((frame_index, result if asked else replace(result, surface=None)))
+
+    def finish(self) -> None:
+        """There are no more frames."""
+        smoothed = smooth_results([result for _, result in self._held])
+        for (frame_index, _), result in zip(self._held, smoothed, strict=True):
+            self._write(frame_index, result)
+        self._held = []
+
+    def _write(self, frame_index: int, result: TrackResult) -> None:
+        seen = {concept: r and result.locate(r) for concept, r in self._regions[result.object_id].items()}
+        line = as_json_line(result, frame_index, seen)
+        for text in self._texts:
+            text.write(line + "\n")
+            text.flush()  # a program at the other end of a pipe waits for the line
 
 
 def as_json_line(result: TrackResult, frame_index: int, regions: Mapping[str, SeenRegion | None] | None = None) -> str:
