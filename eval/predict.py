@@ -20,6 +20,7 @@ from eval.instances import ObjectInImage
 from eval.peers import method_kind, open_method
 from eval.summary import TrackingCounts
 from reference.onboard import onboard, read_reference_frames
+from reference.unposed import onboard_unposed, read_unposed_frames
 from reference.vocabulary import VocabularySet
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
@@ -46,7 +47,8 @@ class Protocol:
     smooth: "offline" smooths the filtered poses over each scene.
     concepts: only the first so many of them, all where there are fewer. method: "ours", or a peer as `eval.peers` has
     it. initialisation: "gt" tells the method each object's true pose, once a scene, in the first frame where the object
-    is visible. masks: which the dataset's frames have, those that models are made of too.
+    is visible. masks: which the dataset's frames have, those that models are made of too. unposed: reference frames are
+    spread over the scene, and of their poses only the first one's is told, which sets the object frame.
 
     Raises ConfigError where the method does not exist, or cannot do with that initialisation, with no view or concept,
     or where there are no filtered poses to smooth."""
@@ -61,6 +63,7 @@ class Protocol:
     concepts: int | None = None
     masks: MaskKind = "visib"
     smooth: Literal["off", "offline"] = "off"
+    unposed: bool = False
 
     def __post_init__(self) -> None:
         if self.views < 1:
@@ -196,19 +199,42 @@ def _onboard(
 ) -> list[ConceptModel]:
     """Models of the objects of which one can be made; the others are noted in `tracked.refused`."""
     models = []
-    config = protocol.config
+    source = dataset.scene(scene_id, protocol.masks)
+    make = _unposed if protocol.unposed else _posed
     for object_id in object_ids:
         try:
-            frames = read_reference_frames(dataset.scene(scene_id, protocol.masks), object_id, protocol.views)
             labels = protocol.labels_of(object_id, category_of(dataset, object_id))
-            models.append(onboard(frames, protocol.backend, config.view, config.cloud, labels))
+            model, frames = make(source, object_id, protocol, labels)
         except OnboardingError as error:
             log.warning("scene %d: %s", scene_id, error)
             tracked.refused[f"{scene_id}/{object_id}"] = str(error)
             continue
         image_ids = dataset.image_ids(scene_id)
-        tracked.reference_frames.update((scene_id, object_id, image_ids[f.frame.index]) for f in frames)
+        tracked.reference_frames.update((scene_id, object_id, image_ids[frame.index]) for frame in frames)
+        models.append(model)
     return models
+
+
+def _posed(
+    source: PosedSource, object_id: str, protocol: Protocol, labels: Sequence[str] | None
+) -> tuple[ConceptModel, list[Frame]]:
+    """A model, and the frames that it was made of."""
+    posed, config = read_reference_frames(source, object_id, protocol.views), protocol.config
+    model = onboard(posed, protocol.backend, config.view, config.cloud, labels)
+    return model, [each.frame for each in posed]
+
+
+def _unposed(
+    source: PosedSource, object_id: str, protocol: Protocol, labels: Sequence[str] | None
+) -> tuple[ConceptModel, list[Frame]]:
+    """A model, and the frames that were given to make it of, whether they joined or not."""
+    frames = read_unposed_frames(source, object_id, protocol.views)
+    first = frames[0][0]
+    told = next((s.T_cam_obj for s in source.sightings(object_id) if s.index == first.index), None)
+    if told is None:
+        raise OnboardingError(f"{first.provenance.source} has no pose of object {object_id!r} to set the object frame")
+    model = onboard_unposed(frames, object_id, protocol.backend, protocol.config, labels, T_cam_obj=told)
+    return model, [frame for frame, _ in frames]
 
 
 def _truth(source: PosedSource, object_ids: Sequence[str]) -> tuple[list[dict[str, Pose]], set[tuple[int, str]]]:

@@ -27,6 +27,7 @@ MASKS = {
     "full": "the dataset's full masks: whole silhouettes, with the pixels of whatever hides the object",
     "carried": "carried by the tracker from the dataset's first visible mask of each object and scene",
 }
+UNPOSED = "found by the tracker; the first one's true pose sets the object frame"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,7 @@ class TrackRun:
     masks: str = "visib"
     poses: Literal["filtered", "raw"] = "filtered"
     smooth: Literal["off", "offline"] = "off"
+    unposed: bool = False
     object_ids: tuple[str, ...] | None = None
     threads: int = 1
 
@@ -84,6 +86,7 @@ class TrackRun:
             initialisation=self.initialisation,
             concepts=self.concepts,
             masks=self.given_masks,
+            unposed=self.unposed,
         )
 
     def stated(self, backend: SaliencyBackend) -> dict[str, object]:
@@ -94,6 +97,7 @@ class TrackRun:
             **kind.stated(self.config, backend, self.vocabulary, self.initialisation),
             "concepts": (self.concepts or "all of the vocabulary") if kind.concepts else "not used by the method",
             "views": self.views,
+            "reference_poses": UNPOSED if self.unposed else "true ones",
             "masks": MASKS[self.masks],
             "reinitialisation": "by the method itself, never from the truth",
             "poses": self.poses,
@@ -121,6 +125,7 @@ class TrackRun:
             "masks": self.masks,
             "poses": self.poses,
             "smooth": self.smooth,
+            "unposed": self.unposed,
             "threads": self.threads,
             "code": code_fingerprint(),
             "packages": package_versions(),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,7 +15,11 @@ from tracker.terminal import STDERR, run
 
 if TYPE_CHECKING:
     from tracker.concept import ConceptModel
-    from tracker.frame import PosedFrame
+    from tracker.config import TrackerConfig
+    from tracker.frame import Frame, Mask
+    from tracker.saliency import SaliencyBackend
+    from tracker.sources import PosedSource
+    from tracker.symmetry import Symmetry
 
 
 @dataclass
@@ -34,7 +37,7 @@ class Ask:
     model: str | None = None
     """Name of the model there. Default: CONCEPTRACK_LLM_MODEL. The key is read from OPENAI_API_KEY."""
 
-    def labels(self, frames: Sequence[PosedFrame]) -> tuple[str, ...] | None:
+    def labels(self, frame: Frame, mask: Mask) -> tuple[str, ...] | None:
         from reference.llm import endpoint_from
         from reference.vocabulary_cache import cached_vocabulary
         from tracker.view import bounding_box
@@ -42,15 +45,15 @@ class Ask:
         if self.category is None:
             return None
         endpoint = endpoint_from({"base_url": self.url, "model": self.model}, os.environ)
-        box, picture = bounding_box(frames[0].mask), None
+        box, picture = bounding_box(mask), None
         if self.kind != "default" and box is not None:
-            picture = frames[0].frame.rgb[box.y0 : box.y1, box.x0 : box.x1]
+            picture = frame.rgb[box.y0 : box.y1, box.x0 : box.x1]
         return cached_vocabulary(self.category, self.kind, self.concepts, endpoint, picture).labels
 
 
 @dataclass
 class Reference:
-    """Make a concept model from a few frames of a recording in which the object's pose is known."""
+    """Make a concept model from a few frames of a recording in which the object's pose is known, or --unposed."""
 
     source: tyro.conf.Positional[str]
     """bop:PATH:SCENE, folder:PATH or synthetic:NAME."""
@@ -60,6 +63,11 @@ class Reference:
     """File to write, for example mug.concept."""
     views: Annotated[int, tyro.conf.arg(metavar="K")] = 2
     """How many reference frames to pick from the recording."""
+    unposed: bool = False
+    """No poses are needed, and none are read: the tracker finds how the reference frames belong together. They are
+    spread over the recording, and have to show enough of the same side; those that cannot be joined are named."""
+    least_confidence: float = 0.98
+    """With --unposed: from which confidence a frame joins the others."""
     backend: str = "attributes"
     """Which saliency backend finds the concepts; "siglip2+attributes" joins two."""
     weights: str | None = None
@@ -81,11 +89,9 @@ class Reference:
     """Replace the file if it exists."""
 
     def __call__(self) -> None:
-        from reference.onboard import onboard, read_reference_frames
         from reference.plate import write_concept_plate
         from reference.vocabulary import read_vocabulary
         from tracker.config import read_config
-        from tracker.declared_symmetry import parse_symmetry
         from tracker.errors import ConfigError
         from tracker.output import require_free
         from tracker.saliency import BackendOptions, open_backend
@@ -93,24 +99,64 @@ class Reference:
 
         if self.views < 1:
             raise ConfigError(f"--views: at least one reference frame is needed, got {self.views}")
+        if not 0 <= self.least_confidence <= 1:
+            raise ConfigError(f"--least-confidence: expected a number from 0 to 1, got {self.least_confidence:g}")
         if self.vocabulary is not None and self.ask.category is not None:
             raise ConfigError("--vocabulary and --ask.category both name concepts: give one of them")
         plate = self.out.with_suffix(".concepts.png") if self.show == "concepts" else None
         for path in (self.out, plate):
             if path is not None:
                 require_free(path, self.overwrite)
-        config = read_config(self.config)
-        symmetry = None if self.symmetry == "auto" else parse_symmetry(self.symmetry)
+        config, symmetry = read_config(self.config), self._symmetry()
         labels = read_vocabulary(self.vocabulary).for_object(self.object).labels if self.vocabulary else None
         backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
         source = open_source(self.source)
-        frames = read_reference_frames(source, self.object, self.views)
-        labels = labels or self.ask.labels(frames)
-        model = onboard(frames, backend, config.view, config.cloud, labels, symmetry)
+        make = self._unposed if self.unposed else self._posed
+        model = make(source, backend, config, labels, symmetry)
         model.save(self.out)
         if plate is not None:
             write_concept_plate(plate, model, backend)
         STDERR.print(_verdict(model, self.out))
+
+    def _posed(
+        self,
+        source: PosedSource,
+        backend: SaliencyBackend,
+        config: TrackerConfig,
+        labels: tuple[str, ...] | None,
+        symmetry: Symmetry | None,
+    ) -> ConceptModel:
+        from reference.onboard import onboard, read_reference_frames
+
+        frames = read_reference_frames(source, self.object, self.views)
+        labels = labels or self.ask.labels(frames[0].frame, frames[0].mask)
+        return onboard(frames, backend, config.view, config.cloud, labels, symmetry)
+
+    def _unposed(
+        self,
+        source: PosedSource,
+        backend: SaliencyBackend,
+        config: TrackerConfig,
+        labels: tuple[str, ...] | None,
+        symmetry: Symmetry | None,
+    ) -> ConceptModel:
+        from reference.unposed import onboard_unposed, read_unposed_frames
+
+        frames = read_unposed_frames(source, self.object, self.views)
+        labels = labels or self.ask.labels(*frames[0])
+        sure = self.least_confidence
+        return onboard_unposed(frames, self.object, backend, config, labels, symmetry, least_confidence=sure)
+
+    def _symmetry(self) -> Symmetry | None:
+        from tracker.declared_symmetry import parse_symmetry
+        from tracker.errors import ConfigError
+
+        if self.unposed and self.symmetry not in ("auto", "none"):
+            raise ConfigError(
+                f"--symmetry {self.symmetry} is about the object's own axes, which nobody knows with --unposed: "
+                "expected auto or none"
+            )
+        return None if self.symmetry == "auto" else parse_symmetry(self.symmetry)
 
 
 def _verdict(model: ConceptModel, path: Path) -> Table:
@@ -119,6 +165,9 @@ def _verdict(model: ConceptModel, path: Path) -> Table:
     table.add_row("object", model.object_id)
     table.add_row("backend", f"{model.backend}, {len(model.labels)} concepts")
     table.add_row("reference frames", "\n".join(model.notes["reference_frames"]))
+    if "object_frame" in model.notes:
+        table.add_row("left out", "\n".join(model.notes["left_out"]) or "nothing")
+        table.add_row("object frame", model.notes["object_frame"])
     table.add_row("diameter seen", f"{model.diameter_m * 1000:.0f} mm")
     table.add_row("surface points", str(quality["points"]))
     table.add_row("viewing sphere", f"{quality['coverage']:.0%} within 60 degrees of a reference view")

@@ -46,12 +46,26 @@ def onboard(
 
     Raises OnboardingError where a frame has no usable points or the frames together do not make a model.
     """
+    model = joined_model(frames, backend, view_config, cloud_config, vocabulary, symmetry)
+    warn_of_problems(model)
+    return model
+
+
+def joined_model(
+    frames: Sequence[PosedFrame],
+    backend: SaliencyBackend,
+    view_config: ViewConfig | None = None,
+    cloud_config: CloudConfig | None = None,
+    vocabulary: Sequence[str] | None = None,
+    symmetry: Symmetry | None = None,
+) -> ConceptModel:
+    """As `onboard`, but says nothing of what the model is missing: that is in its notes."""
     view_config, cloud_config = view_config or ViewConfig(), cloud_config or CloudConfig()
     if not frames:
         raise OnboardingError("onboarding needs at least one reference frame")
 
     # How big is it? The surfaces alone, at a resolution guessed from the mask.
-    surfaces = [_surface(frame, view_config, cloud_config) for frame in frames]
+    surfaces = [surface_of(frame, view_config, cloud_config) for frame in frames]
     diameter_m = _diameter(surfaces, frames)
 
     # What is where? The concepts, at scales relative to that size.
@@ -77,22 +91,19 @@ def onboard(
     quality = judge(model)
     if not quality.usable:
         raise OnboardingError(f"no usable model of object {model.object_id!r}: {'; '.join(quality.problems)}")
-    for problem in quality.problems:
-        logger.warning("model of object %r: %s", model.object_id, problem)
     verdict = {**asdict(quality), "problems": list(quality.problems)}
     symmetry = detect_symmetry(model) if symmetry is None else symmetry
     return replace(model, notes={**model.notes, "quality": verdict}, symmetry=symmetry)
 
 
-def _posed(source: PosedSource, object_id: str, sighting: Sighting) -> PosedFrame:
-    frame = source[sighting.index]
-    if object_id not in frame.masks:
-        raise OnboardingError(f"{frame.provenance.source} has no mask of object {object_id!r}")
-    return PosedFrame(frame, object_id, sighting.T_cam_obj, frame.masks[object_id])
+def warn_of_problems(model: ConceptModel) -> None:
+    for problem in model.notes["quality"]["problems"]:
+        logger.warning("model of object %r: %s", model.object_id, problem)
 
 
-def _surface(frame: PosedFrame, view_config: ViewConfig, cloud_config: CloudConfig) -> Floats:
-    """Points (N, 3) of the masked surface in object coordinates."""
+def surface_of(frame: PosedFrame, view_config: ViewConfig, cloud_config: CloudConfig) -> Floats:
+    """Points (N, 3) of the masked surface in object coordinates, without outliers. Raises OnboardingError where there
+    are too few."""
     where = f"reference frame {frame.frame.provenance.source}, object {frame.object_id!r}"
     box = bounding_box(frame.mask)
     if box is None:
@@ -108,6 +119,13 @@ def _surface(frame: PosedFrame, view_config: ViewConfig, cloud_config: CloudConf
     if len(kept) < LEAST_POINTS:
         raise OnboardingError(f"{where}: {len(kept)} points without outliers, {LEAST_POINTS} are needed")
     return frame.T_cam_obj.inverse() @ kept
+
+
+def _posed(source: PosedSource, object_id: str, sighting: Sighting) -> PosedFrame:
+    frame = source[sighting.index]
+    if object_id not in frame.masks:
+        raise OnboardingError(f"{frame.provenance.source} has no mask of object {object_id!r}")
+    return PosedFrame(frame, object_id, sighting.T_cam_obj, frame.masks[object_id])
 
 
 def _diameter(surfaces: Sequence[Floats], frames: Sequence[PosedFrame]) -> float:

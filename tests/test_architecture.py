@@ -36,7 +36,8 @@ ORDER = {
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
-        "quality", "self_alignment", "symmetry_detection", "onboard", "plate", "__main__",
+        "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "unposed",
+        "plate", "__main__",
     ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}

@@ -183,6 +183,18 @@ def test_reference_takes_a_declared_symmetry_and_shows_it(declared: str, told: s
     assert ConceptModel.load(path).symmetry.packed() == parse_symmetry(declared).packed()
 
 
+def test_reference_needs_no_poses_and_says_what_it_did_without(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "a.concept"
+    said = run("reference", SOURCE, "--object", BOX, "--views", 2, "--out", path, "--unposed")
+    assert said.code == 0, said.err
+    assert "left out" in said.err
+    assert "centre of what the first reference frame shows" in " ".join(said.err.split())
+    made = ConceptModel.load(path)
+    assert made.notes["left_out"] == []
+    assert len(made.references) == 2
+    assert (made.references[0].T_cam_obj.rotation == np.eye(3)).all()
+
+
 def test_reference_overwrites_only_when_it_is_told_to(model: Path, run: Run, tmp_path: Path) -> None:
     path = tmp_path / "box.concept"
     path.write_text("precious")
@@ -200,6 +212,9 @@ def test_reference_overwrites_only_when_it_is_told_to(model: Path, run: Run, tmp
         (SOURCE, ("--object", BOX, "--backend", "tea"), ("'tea'", "attributes")),
         (SOURCE, ("--object", BOX, "--views", "0"), ("--views", "0")),
         (SOURCE, ("--object", BOX, "--symmetry", "round"), ("'round'", "AXIS:ANGLE", "x:180,y:180")),
+        (SOURCE, ("--object", BOX, "--symmetry", "z:inf", "--unposed"), ("z:inf", "auto or none")),
+        (SOURCE, ("--object", BOX, "--least-confidence", "98", "--unposed"), ("--least-confidence", "98")),
+        (SOURCE, ("--object", "spoon", "--unposed"), ("'spoon'", BOX)),
         ("synthetic:kitchen", ("--object", BOX), ("'kitchen'", "tabletop", "leave")),
         ("webcam:0", ("--object", BOX), ("webcam:0", "bop", "folder", "synthetic")),
         ("synthetic:turn?size=64x64&object=mug&frames=2", ("--object", "mug"), ("none of 2 frames", "pixels")),
@@ -492,6 +507,15 @@ def test_eval_track_says_which_method_it_scored_and_what_that_was_told(run: Run,
     assert (protocol["method"], protocol["backend"]) == ("icp", "not used by the method")
     assert protocol["initialisation"].startswith("gt: each object's true pose is told once a scene")
     assert protocol["method_settings"]["reach_start"] == 0.8
+
+
+def test_eval_track_scores_models_of_unposed_frames_in_the_true_object_frame(run: Run, tmp_path: Path) -> None:
+    said = run("eval", "track", "--dataset", SOURCE, "--views", 2, "--unposed", "--out", tmp_path / "out")
+    assert said.code == 0, said.err
+    scores = json.loads((tmp_path / "out" / "scores.json").read_text())
+    assert scores["protocol"]["reference_poses"].startswith("found by the tracker")
+    assert scores["metrics"]["pooled"]["add_auc"] > 90
+    assert scores["metrics"]["pooled"]["instances"] == 4
 
 
 def test_eval_track_refuses_a_folder_with_results(run: Run, filled: Path) -> None:

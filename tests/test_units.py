@@ -153,7 +153,7 @@ def test_a_unit_that_fails_stops_the_run_or_stands_in_its_place_and_the_others_a
     [
         {"views": 1}, {"poses": "raw"}, {"initialisation": "gt"}, {"concepts": 5}, {"object_ids": ("1",)},
         {"threads": 2}, {"config": TrackerConfig(seed=7)}, {"backend": "attributes+clip"},
-        {"dataset": "bop:elsewhere"}, {"masks": "full"},
+        {"dataset": "bop:elsewhere"}, {"masks": "full"}, {"unposed": True},
         {"vocabularies": VocabularySet("mine", (Vocabulary("thing", ("red",)),))}, {"method": "sift"},
     ],
 )  # fmt: skip

@@ -44,6 +44,9 @@ class Track:
     """Only the first so many of them. Default: all."""
     views: int = 2
     """Reference frames an object and scene; they are not scored."""
+    unposed: bool = False
+    """Make models without the poses of their reference frames, but the first one's, which sets the object frame. They
+    are spread over the scene; without it, they are picked by their poses."""
     masks: Literal["visib", "full", "carried"] = "visib"
     """Where the object's pixels come from: the dataset's masks of what can be seen; those of the whole silhouette, also
     where something hides it (BOP's mask/); or its first visible one alone, which the tracker carries on by itself."""
@@ -167,6 +170,7 @@ class Track:
             masks=self.masks,
             poses=self.poses,
             smooth=self.smooth,
+            unposed=self.unposed,
             object_ids=self.objects,
             threads=self.threads,
         )
