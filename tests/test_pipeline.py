@@ -238,7 +238,7 @@ def test_an_object_is_placed_by_a_name_and_at_a_time_that_there_is(
 ) -> None:
     tracker = ObjectTracker(can_model)
     tracker.step(empty_mask(can_frames[1]))
-    with pytest.raises(ConfigError, match="no model of object 'mug' to place; there are soup_can"):
+    with pytest.raises(ConfigError, match="no model of object 'mug'; there are soup_can"):
         tracker.place("mug", can_truth, can_frames[1].stamp_ns)
     for stamp_ns in (can_frames[0].stamp_ns, -1, 0.5):
         with pytest.raises(

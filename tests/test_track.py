@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -11,13 +11,16 @@ import pytest
 from reference.onboard import onboard, read_reference_frames
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
+from tracker.errors import ConfigError
 from tracker.first_masks import FirstMasks
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.pipeline import ObjectTracker
+from tracker.pointing import Click, Pointer
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources.synthetic import SyntheticScene, open_scene
+from tracker.view import Box, bounding_box
 
 CARRIED = TrackerConfig(masks="carried")
 CAN = "soup_can"
@@ -131,3 +134,51 @@ def test_a_mask_that_a_frame_gives_overrules_what_is_carried(can_model: ConceptM
 def test_masks_are_carried_by_a_prior() -> None:
     with pytest.raises(ValueError, match="masks=carried needs prior=true"):
         TrackerConfig(masks="carried", prior=False)
+
+
+def middle_of(mask: np.ndarray) -> Click:
+    rows, columns = np.nonzero(mask)
+    k = int(np.argmin(np.hypot(rows - rows.mean(), columns - columns.mean())))
+    return Click(int(columns[k]), int(rows[k]))
+
+
+def grown(mask: np.ndarray) -> Box:
+    """Around it, as a hand draws it."""
+    box = bounding_box(mask)
+    assert box is not None
+    return Box(box.x0 - 9, box.y0 - 6, box.x1 + 5, box.y1 + 8)
+
+
+@pytest.mark.parametrize("pointed", [middle_of, grown])
+def test_a_click_or_a_box_on_the_first_frame_will_do(
+    pointed: Callable[[np.ndarray], Pointer],
+    can_scene: SyntheticScene,
+    can_model: ConceptModel,
+    can_frames: list[Frame],
+) -> None:
+    tracker = ObjectTracker(can_model, CARRIED)
+    tracker.point_out(CAN, pointed(can_frames[0].masks[CAN]))
+    for frame in can_frames[:3]:
+        (result,) = tracker.step(bare(frame))
+        assert result.state is TrackState.TRACKING, result.reason
+        assert_near(result.pose, can_scene.sightings(CAN)[frame.index].T_cam_obj)
+
+
+def test_what_is_pointed_out_elsewhere_is_not_believed_to_be_where_it_was(
+    can_model: ConceptModel, can_frames: list[Frame]
+) -> None:
+    """The user's word counts, and where nothing like the object is, nothing is made up."""
+    tracker = ObjectTracker(can_model, CARRIED)
+    assert tracker.step(can_frames[0])[0].state is TrackState.TRACKING
+    tracker.point_out(CAN, Click(2, 2))
+    (result,) = tracker.step(bare(can_frames[1]))
+    assert (result.state, result.pose) == (TrackState.INITIALISING, None)
+    tracker.point_out(CAN, middle_of(can_frames[2].masks[CAN]))
+    assert tracker.step(bare(can_frames[2]))[0].state is TrackState.TRACKING
+
+
+def test_nobody_points_where_every_frame_has_a_mask(can_model: ConceptModel) -> None:
+    with pytest.raises(ConfigError, match="every frame's mask"):
+        ObjectTracker(can_model).point_out(CAN, Click(1, 1))
+    with pytest.raises(ConfigError, match="no model of object 'mug'"):
+        ObjectTracker(can_model, CARRIED).point_out("mug", Click(1, 1))

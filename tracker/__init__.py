@@ -16,11 +16,15 @@ if TYPE_CHECKING:
     from tracker.frame import Frame, PosedFrame
     from tracker.geometry import Intrinsics, Pose
     from tracker.pipeline import ObjectTracker
+    from tracker.pointing import Click
     from tracker.result import TrackResult, TrackState
     from tracker.saliency import open_backend
     from tracker.sources import open_source
+    from tracker.view import Box
 
 _HOME = {
+    "Box": "tracker.view",
+    "Click": "tracker.pointing",
     "ConceptModel": "tracker.concept",
     "Frame": "tracker.frame",
     "Intrinsics": "tracker.geometry",
@@ -37,6 +41,8 @@ _HOME = {
 }
 
 __all__ = [
+    "Box",
+    "Click",
     "ConceptModel",
     "Frame",
     "Intrinsics",

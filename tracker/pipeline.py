@@ -10,6 +10,7 @@ from tracker.config import TrackerConfig
 from tracker.errors import ConfigError, FrameError, LateFrameError
 from tracker.frame import Frame
 from tracker.geometry import Pose
+from tracker.pointing import Pointer
 from tracker.result import TrackResult
 from tracker.saliency import Query, Saliency, SaliencyBackend, open_backend
 from tracker.stopwatch import Stopwatch
@@ -42,7 +43,7 @@ class ObjectTracker:
         self._backend = backend
         self._tracks = [Track(model, config) for model in models]
         self._camera = CameraMotion()
-        self._prior, self._last_stamp_ns, self._placed_ns = config.prior, -1, -1
+        self._config, self._last_stamp_ns, self._placed_ns = config, -1, -1
 
     def place(self, object_id: str, T_cam_obj: Pose, stamp_ns: int) -> None:
         """Tell where an object is, roughly: the next frame looks there first, and elsewhere where it is not there.
@@ -51,18 +52,30 @@ class ObjectTracker:
         Raises ConfigError where there is no model of the object or the tracker has no prior, FrameError where the time
         is past.
         """
-        tracks = {track.object_id: track for track in self._tracks}
-        if object_id not in tracks:
-            raise ConfigError(f"there is no model of object {object_id!r} to place; there are {', '.join(tracks)}")
-        if not self._prior:
+        track = self._track_of(object_id)
+        if not self._config.prior:
             raise ConfigError(f"object {object_id!r} cannot be placed: with prior off every frame is searched anew")
         if not isinstance(stamp_ns, int) or stamp_ns < max(self._last_stamp_ns, 0):
             raise FrameError(
                 f"the pose of object {object_id!r} is of {stamp_ns!r} ns: expected whole nanoseconds, not before the "
                 f"last frame's {max(self._last_stamp_ns, 0)} ns"
             )
-        tracks[object_id].place(T_cam_obj, stamp_ns)
+        track.place(T_cam_obj, stamp_ns)
         self._placed_ns = max(self._placed_ns, stamp_ns)
+
+    def point_out(self, object_id: str, there: Pointer) -> None:
+        """Tell where an object is in the next frame: a `Box` around it or a `Click` on it, in pixels. What was known of
+        it is forgotten, and it is looked for there alone, and around there in the frames after that.
+
+        Raises ConfigError where there is no model of the object, or masks are given by every frame.
+        """
+        track = self._track_of(object_id)
+        if self._config.masks != "carried":
+            raise ConfigError(
+                f"object {object_id!r} cannot be pointed out: every frame's mask says where it is; "
+                'with masks="carried" the tracker goes on by itself'
+            )
+        track.point_out(there)
 
     def step(self, frame: Frame) -> tuple[TrackResult, ...]:
         """Every model's result, in their order.
@@ -93,6 +106,12 @@ class ObjectTracker:
                     results[k] = ended.value
             answers = self._saliency(asked, clocks)
         return tuple(results[k] for k in range(len(steps)))
+
+    def _track_of(self, object_id: str) -> Track:
+        tracks = {track.object_id: track for track in self._tracks}
+        if object_id not in tracks:
+            raise ConfigError(f"there is no model of object {object_id!r}; there are {', '.join(tracks)}")
+        return tracks[object_id]
 
     def _saliency(self, views: Mapping[int, ObjectView], clocks: Sequence[Stopwatch]) -> dict[int, Saliency | None]:
         if not views:

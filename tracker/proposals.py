@@ -12,8 +12,9 @@ from tracker.concept import ConceptModel
 from tracker.frame import Frame, Mask
 from tracker.geometry import Floats
 from tracker.matching import Matcher, MatchingConfig
+from tracker.pointing import Pointer, clicked_m, measured_in
 from tracker.saliency import Saliency
-from tracker.view import ObjectView, ViewConfig, view_object
+from tracker.view import Box, ObjectView, ViewConfig, view_object
 
 CENTRE_BEHIND = 0.25  # of the diameter: an object's centre lies about this far behind its surface
 LIKELY = 0.02  # quantile of the picture's divergences beyond which a point hardly speaks for the object any more
@@ -65,12 +66,21 @@ class Proposals:
         likely = np.exp(-matches.divergence / max(np.quantile(matches.divergence, LIKELY), 1e-6))
         votes = likely / np.maximum(np.bincount(part, likely)[part], 1e-12)
         places = points.points[matches.query_index]
-        centres = places * (1 + CENTRE_BEHIND * self._diameter_m / np.linalg.norm(places, axis=1, keepdims=True))
+        centres = self._behind(places)
         tree = KDTree(places)
         centres = centres[np.linspace(0, len(centres) - 1, min(len(centres), 500)).astype(int)]
         around = tree.query_ball_point(centres, self._diameter_m / 2)
         worth = np.array([votes[near].sum() for near in around])
         return [self.around(centre, picture.frame) for centre in self._apart(centres, worth)]
+
+    def pointed_out(self, there: Pointer, frame: Frame) -> Mask:
+        """(H, W) bool, pixels with depth that may be the object's where somebody points; none where nothing has."""
+        if isinstance(there, Box):
+            return measured_in(there, frame)
+        place_m = clicked_m(there, frame)
+        if place_m is None:
+            return np.zeros(frame.depth_m.shape, bool)
+        return self.around(self._behind(place_m[None])[0], frame)
 
     def around(self, centre: Floats, frame: Frame, more: float = 0.0) -> Mask:
         """(H, W) bool, pixels whose points lie within the radius of a place (3,), metres, camera coordinates. more: so
@@ -87,6 +97,10 @@ class Proposals:
         mask = np.zeros(frame.depth_m.shape, bool)
         mask[y0:y1, x0:x1] = near & (depth_m > 0)
         return mask
+
+    def _behind(self, surface: Floats) -> Floats:
+        """(N, 3) about where the centre of an object is whose surface is seen at these points."""
+        return surface * (1 + CENTRE_BEHIND * self._diameter_m / np.linalg.norm(surface, axis=1, keepdims=True))
 
     def _apart(self, centres: Floats, worth: Floats) -> list[Floats]:
         """The worthiest places, none within half a diameter of a worthier one."""

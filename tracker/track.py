@@ -11,9 +11,10 @@ import numpy as np
 from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
-from tracker.frame import Frame
+from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
 from tracker.looking import Asking, Found, Look, Looking
+from tracker.pointing import Pointer
 from tracker.pose_filter import PoseFilter
 from tracker.proposals import Proposals
 from tracker.result import Surface, TrackResult, TrackState
@@ -40,6 +41,7 @@ class Track:
         self._state = TrackState.INITIALISING
         self._where = Whereabouts()
         self._frames_lost = 0
+        self._pointer: Pointer | None = None
 
     @property
     def object_id(self) -> str:
@@ -54,12 +56,18 @@ class Track:
         self._filter.start(T_cam_obj, information, stamp_ns)
         self._where.told(T_cam_obj)
 
+    def point_out(self, there: Pointer) -> None:
+        """In the next frame. What was known until then is not."""
+        self._pointer, self._state, self._frames_lost = there, TrackState.INITIALISING, 0
+        self._filter, self._where = PoseFilter(self._config.filter), Whereabouts()
+
     def step(self, frame: Frame, camera: CameraMotion, clock: Stopwatch) -> Asking[TrackResult]:
         # 1. Is it where it is said, or expected, to be?
-        found = yield from self._look.best(self._looks(frame, camera, clock), frame, clock)
+        there, masked = self._pointed_out(frame)
+        found = yield from self._look.best(self._looks(there, masked, frame, camera, clock), frame, clock)
 
         # 2. If not, is it anywhere in the picture? That takes a second frame to be believed.
-        if self._carried and not self._believed(found) and self._search_due(frame):
+        if self._carried and there is None and not self._believed(found) and self._search_due:
             elsewhere = yield from self._anywhere(frame, clock)
             if self._believed(elsewhere):
                 self._where.carry(camera, elsewhere.hypothesis.refined.T_cam_obj)
@@ -70,9 +78,17 @@ class Track:
             return self._tracked(frame, found, camera, clock)
         if self._carried:
             self._where.carry(camera)
-            if (mask := frame.masks.get(self._model.object_id)) is not None:
-                self._where.point_out(mask, frame, camera)
+            if there is not None:
+                self._where.point_out(there, frame, camera)
         return self._lost(frame, self._why_not(found), clock)
+
+    def _pointed_out(self, frame: Frame) -> tuple[Mask | None, bool]:
+        """Pixels (H, W) where somebody says that it is, and whether all of them are known to be its own."""
+        pointer, self._pointer = self._pointer, None
+        mask = frame.masks.get(self._model.object_id)
+        if mask is None and pointer is not None:
+            return self._proposals.pointed_out(pointer, frame), False
+        return mask, True
 
     @staticmethod
     def _why_not(found: Found | str) -> str:
@@ -87,13 +103,16 @@ class Track:
     def _carried(self) -> bool:
         return self._config.masks == "carried"
 
-    def _looks(self, frame: Frame, camera: CameraMotion, clock: Stopwatch) -> Iterator[Look | str]:
-        """Where to look, one after the other until it is found; or why nowhere."""
+    def _looks(
+        self, there: Mask | None, masked: bool, frame: Frame, camera: CameraMotion, clock: Stopwatch
+    ) -> Iterator[Look | str]:
+        """Where to look, one after the other until it is found; or why nowhere. there, masked: where somebody says."""
         predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
-        mask = frame.masks.get(self._model.object_id)
-        if mask is not None:
+        if there is not None and masked:
             expected = () if predicted is None else (predicted,)
-            yield Look(mask, predicted, expected, masked=True) if mask.any() else "out of view: the mask is empty"
+            yield Look(there, predicted, expected, masked=True) if there.any() else "out of view: the mask is empty"
+        elif there is not None:
+            yield Look(there, None)
         elif not self._carried:
             yield f"no mask of object {self._model.object_id!r} was given"
         elif self._where.known:
@@ -144,8 +163,9 @@ class Track:
         likely = found.confidence >= (self._config.believe if goes_on else self._config.regain)
         return likely and found.hypothesis.evidence.surface >= LEAST_SURFACE
 
-    def _search_due(self, frame: Frame) -> bool:
-        return self._model.object_id not in frame.masks and self._frames_lost % self._config.search_every == 0
+    @property
+    def _search_due(self) -> bool:
+        return self._frames_lost % self._config.search_every == 0
 
     def _tracked(self, frame: Frame, found: Found, camera: CameraMotion, clock: Stopwatch) -> TrackResult:
         with clock("filter"):

@@ -1,0 +1,55 @@
+"""Somebody points at an object in a picture: with a box around it, or by a click on it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.errors import ConfigError
+from tracker.frame import Frame, Mask
+from tracker.geometry import Floats
+from tracker.view import Box
+
+REACH_PX = 4  # around a click: depth has holes, and a hand shakes
+
+
+class Click(NamedTuple):
+    """A pixel of a frame that shows the object."""
+
+    column: int
+    row: int
+
+
+Pointer = Box | Click
+
+
+def parse_pointer(text: str) -> Pointer:
+    """ "X,Y" -> a click, "X0,Y0,X1,Y1" -> a box. Raises ConfigError for anything else."""
+    try:
+        numbers = [int(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 2:
+        return Click(*numbers)
+    if len(numbers) == 4 and numbers[0] < numbers[2] and numbers[1] < numbers[3]:
+        return Box(*numbers)
+    raise ConfigError(f"{text!r} points nowhere; expected a pixel X,Y or a box X0,Y0,X1,Y1, whole numbers")
+
+
+def measured_in(box: Box, frame: Frame) -> Mask:
+    """(H, W) bool, the pixels of the box that have depth. What lies behind the object is among them."""
+    mask = np.zeros(frame.depth_m.shape, bool)
+    inside = np.s_[max(box.y0, 0) : max(box.y1, 0), max(box.x0, 0) : max(box.x1, 0)]
+    mask[inside] = frame.depth_m[inside] > 0
+    return mask
+
+
+def clicked_m(click: Click, frame: Frame) -> Floats | None:
+    """(3,) the point of the surface that was clicked, metres, camera coordinates; None where there is no depth."""
+    column, row = click
+    around = Box(column - REACH_PX, row - REACH_PX, column + REACH_PX + 1, row + REACH_PX + 1)
+    depths_m = frame.depth_m[measured_in(around, frame)]
+    if not len(depths_m):
+        return None
+    return frame.intrinsics.unproject(np.array([column]), np.array([row]), np.array([np.median(depths_m)], float))[0]
