@@ -30,9 +30,9 @@ ORDER = {
         "saliency", "cloud", "region", "reference_views",
         "grounding", "symmetry", "declared_symmetry", "concept", "measures", "matching", "appearance",
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
-        "camera_motion", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
-        "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "track", "pipeline", "output",
-        "viewer", "terminal", "__main__",
+        "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
+        "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "places", "track", "pipeline",
+        "output", "viewer", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",

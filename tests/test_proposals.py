@@ -29,7 +29,7 @@ def proposed(
     model: ConceptModel, frame: Frame, attributes: SaliencyBackend, config: ProposalConfig = CONFIG
 ) -> list[Mask]:
     proposals = searcher(model, config)
-    picture = proposals.picture(frame)
+    picture = proposals.picture(frame, frame.depth_m > 0)
     assert picture is not None
     return proposals.masks(picture, attributes([Query(picture, model.labels)])[0], CloudConfig())
 
@@ -108,14 +108,16 @@ def test_the_picture_is_as_coarse_as_suits_the_object(
 ) -> None:
     """At the median depth of the picture the object would be `pixels_across` of its pixels wide, up to rounding."""
     for across in (12, 24):
-        picture = searcher(table_models["tea_box"], ProposalConfig(pixels_across=across)).picture(table_scene[3])
+        picture = searcher(table_models["tea_box"], ProposalConfig(pixels_across=across)).picture(
+            table_scene[3], table_scene[3].depth_m > 0
+        )
         assert picture is not None
         assert picture.pixels_across == pytest.approx(across, rel=0.3)
 
 
 def test_without_depth_there_is_no_picture(table_scene: SyntheticScene, table_models: dict[str, ConceptModel]) -> None:
     nothing = replace(table_scene[3], depth_m=np.zeros_like(table_scene[3].depth_m))
-    assert searcher(table_models["mug"]).picture(nothing) is None
+    assert searcher(table_models["mug"]).picture(nothing, nothing.depth_m > 0) is None
 
 
 def test_with_hardly_any_depth_there_are_no_places(

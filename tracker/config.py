@@ -28,8 +28,9 @@ class TrackerConfig(BaseModel):
     independent, as in the paper. accept: score of the evidence (`tracker.verification.Evidence`) under which a pose
     does not explain the object's pixels, and is not reported. trust: score from which no other pose is looked for.
     jump: by how much a pose found elsewhere has to be better than one where it was expected: objects seldom jump, and
-    may show a side that the model does not know. concepts_every: looks of which one asks for the concepts, where
-    surface and colours alone lead from the prediction to a pose of the confidence `sure`. verified: candidates that are
+    may show a side that the model does not know. sure: confidence from which a pose that fits as well as the last one
+    did is not compared with others, whatever its score. concepts_every: looks of which one asks for the concepts
+    nevertheless, where surface and colours alone lead from the prediction to such a pose. verified: candidates that are
     refined. seed: of the sampling. device: of matching and registration, "auto" is CUDA where there is one.
     masks: "given" by every frame, or "carried" on by the tracker itself from the first one on, which a frame's mask
     overrules. Where nobody gives one, no pixels are known to be the object's: believe is the confidence under which a

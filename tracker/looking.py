@@ -109,8 +109,9 @@ class Looking:
         return self._found(hypothesis, look) or "poor fit: no pose explains what is seen"
 
     def _clear(self, found: Found) -> bool:
-        """Whether nothing better is to be expected: it fits well, and not much worse than it did."""
-        return found.score >= max(self._config.trust, self._usual - self._config.jump)
+        """Whether nothing better is to be expected: it fits well or is likely, and fits not much worse than it did."""
+        as_usual = found.score >= self._usual - self._config.jump
+        return as_usual and (found.score >= self._config.trust or found.confidence >= self._config.sure)
 
     def _sure(self, continued: Found) -> bool:
         """Whether concepts could say nothing new, as it is clearly where it was expected. Surface and colours alone let

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from tracker.camera_motion import CameraMotion
+from tracker.claims import claimed_by_others, in_one_place
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError, FrameError, LateFrameError
 from tracker.frame import Frame
 from tracker.geometry import Pose
+from tracker.places import Moment
 from tracker.pointing import Pointer
 from tracker.result import TrackResult
 from tracker.saliency import Query, Saliency, SaliencyBackend, open_backend
@@ -91,8 +93,9 @@ class ObjectTracker:
             )
         self._last_stamp_ns = frame.stamp_ns
         self._camera.advance(frame)
-        clocks = [Stopwatch() for _ in self._tracks]
-        steps = [track.step(frame, self._camera, clock) for track, clock in zip(self._tracks, clocks, strict=True)]
+        claimed = claimed_by_others([track.shown for track in self._tracks])
+        moments = [Moment(frame, self._camera, others, Stopwatch()) for others in claimed]
+        steps = [track.step(now) for track, now in zip(self._tracks, moments, strict=True)]
         results: dict[int, TrackResult] = {}
 
         # Every object's step asks for the concepts of what it looks at, until it has a result. One batch answers all.
@@ -104,8 +107,20 @@ class ObjectTracker:
                     asked[k] = steps[k].send(saliency)  # pyright: ignore[reportArgumentType]: None starts a generator
                 except StopIteration as ended:
                     results[k] = ended.value
-            answers = self._saliency(asked, clocks)
+            answers = self._saliency(asked, moments)
+        if self._config.masks == "carried":
+            results |= self._one_at_a_place(moments)
         return tuple(results[k] for k in range(len(steps)))
+
+    def _one_at_a_place(self, moments: Sequence[Moment]) -> dict[int, TrackResult]:
+        """Of two objects that explain the same pixels the surer one does; what is said of the other one instead."""
+        corrected = {}
+        for pair in in_one_place([track.shown for track in self._tracks]):
+            kept, refused = sorted(pair, key=lambda k: self._tracks[k].surest, reverse=True)
+            if refused not in corrected and kept not in corrected:
+                other = self._tracks[kept].object_id
+                corrected[refused] = self._tracks[refused].withdrawn(moments[refused], other)
+        return corrected
 
     def _track_of(self, object_id: str) -> Track:
         tracks = {track.object_id: track for track in self._tracks}
@@ -113,9 +128,9 @@ class ObjectTracker:
             raise ConfigError(f"there is no model of object {object_id!r}; there are {', '.join(tracks)}")
         return tracks[object_id]
 
-    def _saliency(self, views: Mapping[int, ObjectView], clocks: Sequence[Stopwatch]) -> dict[int, Saliency | None]:
+    def _saliency(self, views: Mapping[int, ObjectView], moments: Sequence[Moment]) -> dict[int, Saliency | None]:
         if not views:
             return {}
         queries = [Query(view, self._tracks[k].labels) for k, view in views.items()]
-        with Stopwatch.shared([clocks[k] for k in views], "saliency"):
+        with Stopwatch.shared([moments[k].clock for k in views], "saliency"):
             return dict(zip(views, self._backend(queries), strict=True))

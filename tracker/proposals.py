@@ -47,10 +47,10 @@ class Proposals:
         parts = np.floor(model.points / (PART * model.diameter_m))
         self._part = np.unique(parts, axis=0, return_inverse=True)[1].ravel()
 
-    def picture(self, frame: Frame) -> ObjectView | None:
-        """The whole frame as coarse as suits the search; None where nothing has depth."""
+    def picture(self, frame: Frame, searched: Mask) -> ObjectView | None:
+        """The pixels (H, W) that are searched, as coarse as suits that; None where none has depth."""
         view = ViewConfig(pixels_across=self._config.pixels_across, least_pixels=0)
-        return view_object(frame, frame.depth_m > 0, self._diameter_m, view)
+        return view_object(frame, searched, self._diameter_m, view)
 
     def masks(self, picture: ObjectView, saliency: Saliency, cloud: CloudConfig) -> list[Mask]:
         """(H, W) bool each, the likeliest first: what lies around the places where most of the model is matched well.

@@ -1,47 +1,43 @@
-"""One object from frame to frame: where to look for it, and whether what is found there is believed."""
+"""One object from frame to frame: whether what is found of it is believed, and what that says about its pose."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator
 from typing import TypeGuard
 
 import numpy as np
 
-from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
-from tracker.frame import Frame, Mask
+from tracker.frame import Mask
 from tracker.geometry import Pose
-from tracker.looking import Asking, Found, Look, Looking
+from tracker.looking import Asking, Found, Looking
+from tracker.places import Moment, Places
 from tracker.pointing import Pointer
 from tracker.pose_filter import PoseFilter
-from tracker.proposals import Proposals
 from tracker.result import Surface, TrackResult, TrackState
-from tracker.stopwatch import Stopwatch
-from tracker.whereabouts import Whereabouts
 
 logger = logging.getLogger(__name__)
 
 PLACED_SIGMA_RAD, PLACED_SIGMA_M = 0.1, 0.01  # how surely an object is where `place` says
-SAME_RAD, SAME_SHARE = 0.05, 0.03  # poses nearer than this angle and share of the diameter are looked at once
-MOVED_ON = 0.4  # diameters that it may have moved while nobody saw it
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
 
 
 class Track:
-    """One object's stages, and what is remembered of it between frames."""
+    """One object's stages, and what is remembered of it between frames.
+
+    shown: (H, W) bool, the pixels by which it was found in the last frame, None where it was not. surest: to compare
+    by, whether it has been followed for more than a frame, and how likely its pose is right.
+    """
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
-        self._look = Looking(model, config)
-        self._proposals = Proposals(model, config.proposals, config.matching, config.torch_device)
+        self._look, self._places = Looking(model, config), Places(model, config)
         self._filter = PoseFilter(config.filter)
-        self._centre_m = model.points.mean(axis=0)
         self._state = TrackState.INITIALISING
-        self._where = Whereabouts()
-        self._frames_lost = 0
-        self._pointer: Pointer | None = None
+        self._frames_lost, self._frames_followed = 0, 0
+        self.shown: Mask | None = None
+        self.surest = False, 0.0
 
     @property
     def object_id(self) -> str:
@@ -54,102 +50,49 @@ class Track:
     def place(self, T_cam_obj: Pose, stamp_ns: int) -> None:
         information = np.diag([PLACED_SIGMA_RAD**-2] * 3 + [PLACED_SIGMA_M**-2] * 3)
         self._filter.start(T_cam_obj, information, stamp_ns)
-        self._where.told(T_cam_obj)
+        self._places.told(T_cam_obj)
 
     def point_out(self, there: Pointer) -> None:
         """In the next frame. What was known until then is not."""
-        self._pointer, self._state, self._frames_lost = there, TrackState.INITIALISING, 0
-        self._filter, self._where = PoseFilter(self._config.filter), Whereabouts()
+        self._forget()
+        self._places.point_out(there)
+        self._state = TrackState.INITIALISING
 
-    def step(self, frame: Frame, camera: CameraMotion, clock: Stopwatch) -> Asking[TrackResult]:
+    def step(self, now: Moment) -> Asking[TrackResult]:
+        predicted = self._filter.predict(now.frame.stamp_ns) if self._config.prior else None
+
         # 1. Is it where it is said, or expected, to be?
-        there, masked = self._pointed_out(frame)
-        found = yield from self._look.best(self._looks(there, masked, frame, camera, clock), frame, clock)
+        looks = self._places.looks(now, predicted, self._state is TrackState.TRACKING, self._look)
+        found = yield from self._look.best(looks, now.frame, now.clock)
 
         # 2. If not, is it anywhere in the picture? That takes a second frame to be believed.
-        if self._carried and there is None and not self._believed(found) and self._search_due:
-            elsewhere = yield from self._anywhere(frame, clock)
-            if self._believed(elsewhere):
-                self._where.carry(camera, elsewhere.hypothesis.refined.T_cam_obj)
-                return self._lost(frame, "seen again: the next frame has to confirm it", clock)
+        suspected = None
+        if self._carried and not self._believed(found) and self._frames_lost % self._config.search_every == 0:
+            places = yield from self._places.anywhere(now)
+            if not isinstance(places, str):
+                elsewhere = yield from self._look.best(places, now.frame, now.clock)
+                suspected = elsewhere.hypothesis.refined.T_cam_obj if self._believed(elsewhere) else None
 
         # 3. What does that say about its pose, given where it has been?
         if self._believed(found):
-            return self._tracked(frame, found, camera, clock)
+            return self._tracked(now, found, predicted)
         if self._carried:
-            self._where.carry(camera)
-            if there is not None:
-                self._where.point_out(there, frame, camera)
-        return self._lost(frame, self._why_not(found), clock)
+            self._places.not_found(now, suspected)
+        return self._lost(now, "seen again: the next frame has to confirm it" if suspected else self._why_not(found))
 
-    def _pointed_out(self, frame: Frame) -> tuple[Mask | None, bool]:
-        """Pixels (H, W) where somebody says that it is, and whether all of them are known to be its own."""
-        pointer, self._pointer = self._pointer, None
-        mask = frame.masks.get(self._model.object_id)
-        if mask is None and pointer is not None:
-            return self._proposals.pointed_out(pointer, frame), False
-        return mask, True
+    def withdrawn(self, now: Moment, other_id: str) -> TrackResult:
+        """What was found in this frame is another object."""
+        self._forget()
+        return self._lost(now, f"what is seen there is object {other_id!r}")
 
-    @staticmethod
-    def _why_not(found: Found | str) -> str:
-        if isinstance(found, str):
-            return found
-        if found.missed:
-            return found.missed
-        judged = f"explains {found.score:.2f} of it" if found.masked else f"is right at {found.confidence:.0%}"
-        return f"poor fit: the best pose {judged}"
+    def _forget(self) -> None:
+        """Where it was, and how it moved."""
+        self._filter = PoseFilter(self._config.filter)
+        self._places.forget()
 
     @property
     def _carried(self) -> bool:
         return self._config.masks == "carried"
-
-    def _looks(
-        self, there: Mask | None, masked: bool, frame: Frame, camera: CameraMotion, clock: Stopwatch
-    ) -> Iterator[Look | str]:
-        """Where to look, one after the other until it is found; or why nowhere. there, masked: where somebody says."""
-        predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
-        if there is not None and masked:
-            expected = () if predicted is None else (predicted,)
-            yield Look(there, predicted, expected, masked=True) if there.any() else "out of view: the mask is empty"
-        elif there is not None:
-            yield Look(there, None)
-        elif not self._carried:
-            yield f"no mask of object {self._model.object_id!r} was given"
-        elif self._where.known:
-            yield from self._where_it_may_be(self._expected(predicted, camera), frame, clock)
-        elif (place_m := self._where.pointed_out_m(camera)) is not None:
-            yield Look(self._proposals.around(place_m, frame), None)
-        else:
-            yield "not seen yet"
-
-    def _where_it_may_be(self, expected: Iterable[Pose], frame: Frame, clock: Stopwatch) -> Iterator[Look | str]:
-        """Near each pose, of which there is one at least; where it is clearly at none, anywhere around the first."""
-        near: list[Pose] = []
-        for pose in expected:
-            if not any(self._same(pose, other) for other in near):
-                near.append(pose)
-                outline = self._look.outline(pose, frame, clock)
-                yield outline if isinstance(outline, str) else Look(outline, pose, tuple(near))
-        around = self._proposals.around((near[0] @ self._centre_m[None])[0], frame, MOVED_ON)
-        yield Look(around, None, tuple(near))
-
-    def _expected(self, predicted: Pose | None, camera: CameraMotion) -> Iterator[Pose]:
-        """Where it is if it moves on as it did; where it is if it stands still and the camera moved."""
-        if predicted is not None and self._state is TrackState.TRACKING:
-            yield predicted
-        yield from self._where.expected(camera)
-
-    def _same(self, a: Pose, b: Pose) -> bool:
-        return a.angle_to_rad(b) < SAME_RAD and a.distance_to_m(b) < SAME_SHARE * self._model.diameter_m
-
-    def _anywhere(self, frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
-        picture = self._proposals.picture(frame)
-        if picture is None:
-            return "no depth in the whole picture"
-        saliency = yield picture
-        with clock("proposals"):
-            masks = self._proposals.masks(picture, saliency, self._config.cloud)
-        return (yield from self._look.best((Look(mask, None) for mask in masks), frame, clock))
 
     def _believed(self, found: Found | str) -> TypeGuard[Found]:
         """Of pixels that are said to be the object's a pose has to explain enough. Elsewhere it has to be likely: less
@@ -163,25 +106,30 @@ class Track:
         likely = found.confidence >= (self._config.believe if goes_on else self._config.regain)
         return likely and found.hypothesis.evidence.surface >= LEAST_SURFACE
 
-    @property
-    def _search_due(self) -> bool:
-        return self._frames_lost % self._config.search_every == 0
+    @staticmethod
+    def _why_not(found: Found | str) -> str:
+        if isinstance(found, str):
+            return found
+        if found.missed:
+            return found.missed
+        judged = f"explains {found.score:.2f} of it" if found.masked else f"is right at {found.confidence:.0%}"
+        return f"poor fit: the best pose {judged}"
 
-    def _tracked(self, frame: Frame, found: Found, camera: CameraMotion, clock: Stopwatch) -> TrackResult:
-        with clock("filter"):
-            predicted = self._filter.predict(frame.stamp_ns) if self._config.prior else None
+    def _tracked(self, now: Moment, found: Found, predicted: Pose | None) -> TrackResult:
+        stamp_ns, view = now.frame.stamp_ns, found.hypothesis.view
+        with now.clock("filter"):
             refined = found.hypothesis.refined
             refined = refined if predicted is None else refined.nearest(predicted, self._model.symmetry)
             raw, information = refined.T_cam_obj, refined.information
-            filtered = self._filter.update(raw, information, frame.stamp_ns) if self._config.prior else None
+            filtered = self._filter.update(raw, information, stamp_ns) if self._config.prior else None
             if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
-                filtered = self._filter.start(raw, information, frame.stamp_ns)
-        self._state, self._frames_lost = TrackState.TRACKING, 0
+                filtered = self._filter.start(raw, information, stamp_ns)
+        self._state, self._frames_lost, self._frames_followed = TrackState.TRACKING, 0, self._frames_followed + 1
+        self.shown, self.surest = view.mask, (self._frames_followed > 1, found.confidence)
         self._look.came_of_it(found.score)
-        self._where.found(raw, camera)
-        view = found.hypothesis.view
+        self._places.found(raw, now)
         return TrackResult(
-            stamp_ns=frame.stamp_ns,
+            stamp_ns=stamp_ns,
             object_id=self._model.object_id,
             pose=filtered.T_cam_obj,
             state=self._state,
@@ -190,19 +138,19 @@ class Track:
             reason=f"found by {found.hypothesis.origin}",
             raw_pose=raw,
             grounds=found.grounds,
-            timings_ms=clock.timings_ms(),
+            timings_ms=now.clock.timings_ms(),
             surface=Surface(self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera),
             step=filtered.step,
         )
 
-    def _lost(self, frame: Frame, reason: str, clock: Stopwatch) -> TrackResult:
-        self._frames_lost += 1
+    def _lost(self, now: Moment, reason: str) -> TrackResult:
+        self._frames_lost, self._frames_followed, self.shown = self._frames_lost + 1, 0, None
         if self._state is TrackState.TRACKING:
-            logger.info("object %r lost at frame %d: %s", self._model.object_id, frame.index, reason)
+            logger.info("object %r lost at frame %d: %s", self._model.object_id, now.frame.index, reason)
             self._state = TrackState.LOST
             self._look.came_of_it(None)
         return TrackResult(
-            stamp_ns=frame.stamp_ns,
+            stamp_ns=now.frame.stamp_ns,
             object_id=self._model.object_id,
             pose=None,
             state=self._state,
@@ -211,5 +159,5 @@ class Track:
             reason=reason,
             raw_pose=None,
             grounds=None,
-            timings_ms=clock.timings_ms(),
+            timings_ms=now.clock.timings_ms(),
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tracker.sources.synthetic.scenes.crowded import shelf, tabletop
+from tracker.sources.synthetic.scenes.crowded import shelf, tabletop, twins
 from tracker.sources.synthetic.scenes.disturbed import blind, hand, hidden, jerk, lights
 from tracker.sources.synthetic.scenes.layout import Layout
 from tracker.sources.synthetic.scenes.replaced import away, swapped
@@ -35,6 +35,7 @@ SCENES: Mapping[str, SceneKind] = {
     "shelf": SceneKind("six objects on shelves, the camera passes by", 90, shelf),
     "still": SceneKind("one object, nothing moves", 60, still, ("tea_box",)),
     "leave": SceneKind("one object is hidden by a parcel, leaves the view and comes back", 150, leave, ("soup_can",)),
+    "twins": SceneKind("two objects that are alike, one passes before the other", 90, twins, ("mug",)),
     "hidden": SceneKind("something covers the object for a second", 78, hidden, ANY),
     "away": SceneKind("the object is taken away and comes back elsewhere, beside a look-alike", 90, away, ANY),
     "hand": SceneKind("a hand reaches partly before the object", 66, hand, ANY),

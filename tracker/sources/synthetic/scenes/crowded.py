@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.geometry import Pose
-from tracker.sources.synthetic.motion import around, handheld, looking, swing
+from tracker.sources.synthetic.motion import around, handheld, looking, swing, through
+from tracker.sources.synthetic.rendering.world import Placed
 from tracker.sources.synthetic.scenes import furniture, room
 from tracker.sources.synthetic.scenes.layout import Layout, flat, lay, nudged, stand
+from tracker.sources.synthetic.scenes.stage import placed_on_mat
 from tracker.sources.synthetic.things import books, clutter
-from tracker.sources.synthetic.things.objects import tracked_object
+from tracker.sources.synthetic.things.objects import SECOND, tracked_object
 
 
 def tabletop(seed: int, _hero: str) -> Layout:
@@ -78,3 +80,27 @@ def shelf(seed: int, _hero: str) -> Layout:
 
     around_it = [furniture.bookcase(rng, (low, middle, high)), *room.walls(rng, (190, 200, 206)), *things]
     return Layout([nudged(p, rng) for p in tracked], around_it, handheld(camera, seed))
+
+
+def twins(seed: int, hero: str) -> Layout:
+    """Two that are alike; one is taken along before the other, which it hides, to that one's other side."""
+    rng = np.random.default_rng([seed, 15])
+    one, other = tracked_object(hero), tracked_object(f"{hero}{SECOND}")
+    past = through((0.6, 2.4), [(-0.17, 0.0), (0.17, 100.0)])
+
+    def motion(time_s: float) -> Pose:
+        x_m, turned_deg = past(time_s)
+        return placed_on_mat(other, x_m, -0.09, -20 + turned_deg)
+
+    camera = handheld(lambda t: around([0.0, 0.0, 0.06], 3 + 4 * np.sin(t), 22, 0.66), seed)
+    around_it = [
+        furniture.table(rng),
+        furniture.mat(rng, (112, 128, 132), 0.0, 0.02, 3),
+        *room.walls(rng, (214, 204, 190)),
+        nudged(stand(clutter.jar("coffee"), -0.25, 0.25, -80), rng),
+        nudged(stand(clutter.parcel(210, 150, 120), 0.07, 0.29, -8), rng),
+        nudged(stand(clutter.fruit("orange"), 0.28, 0.12, 0), rng),
+    ]
+    return Layout(
+        [nudged(Placed(one, placed_on_mat(one, 0.0, 0.05, -50)), rng), Placed(other, motion)], around_it, camera
+    )

@@ -6,7 +6,7 @@ Object frame: centre of the bounding box, z up as the thing stands, metres.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -55,13 +55,16 @@ OBJECTS: Mapping[str, Callable[[], Thing]] = {
     "bowl": bowl,
 }
 
+SECOND = "_2"  # of two objects that are alike
+
 
 @cache
 def tracked_object(object_id: str) -> Thing:
     """Raises SourceError that lists the objects if there is no such one."""
-    if object_id not in OBJECTS:
+    kind = object_id.removesuffix(SECOND)
+    if kind not in OBJECTS:
         raise SourceError(f"there is no synthetic object {object_id!r}; there is {', '.join(OBJECTS)}")
-    return OBJECTS[object_id]()
+    return replace(OBJECTS[kind](), name=object_id)
 
 
 @cache
