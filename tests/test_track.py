@@ -182,3 +182,41 @@ def test_nobody_points_where_every_frame_has_a_mask(can_model: ConceptModel) -> 
         ObjectTracker(can_model).point_out(CAN, Click(1, 1))
     with pytest.raises(ConfigError, match="no model of object 'mug'"):
         ObjectTracker(can_model, CARRIED).point_out("mug", Click(1, 1))
+
+
+@pytest.fixture(scope="module")
+def twins(attributes: SaliencyBackend) -> tuple[SyntheticScene, list[ConceptModel]]:
+    """Two mugs that are alike, and a model for each."""
+    alone = open_scene("turn?object=mug&size=320x240&frames=284")
+    model = onboard(read_reference_frames(alone, "mug", 4), attributes)
+    scene = open_scene("twins?object=mug&size=320x240")
+    return scene, [replace(model, object_id=object_id) for object_id in scene.object_ids]
+
+
+def test_two_of_a_kind_are_found_without_any_mask_and_never_in_one_place(
+    twins: tuple[SyntheticScene, list[ConceptModel]],
+) -> None:
+    scene, models = twins
+    tracker = ObjectTracker(models, CARRIED)
+    results = [tracker.step(bare(scene[index])) for index in range(10)]
+    for step in results:
+        poses = [result.pose for result in step if result.pose]
+        assert len(poses) < 2 or poses[0].distance_to_m(poses[1]) > 0.1
+    assert any("what is seen there is object" in result.reason for step in results for result in step)
+    truths = [scene.sightings(object_id)[9].T_cam_obj for object_id in scene.object_ids]
+    found = sorted(results[-1], key=lambda result: result.pose.distance_to_m(truths[0]) if result.pose else np.inf)
+    for result, truth in zip(found, truths, strict=True):
+        assert_near(result.pose, truth)
+
+
+def test_of_two_of_a_kind_the_one_that_was_pointed_out_is_followed(
+    twins: tuple[SyntheticScene, list[ConceptModel]],
+) -> None:
+    """Also while the other one, which nobody has a model of here, hides half of it."""
+    scene, (model, _) = twins
+    tracker = ObjectTracker(model, CARRIED)
+    tracker.point_out(model.object_id, middle_of(scene[34].masks[model.object_id]))
+    for index in range(34, 56, 2):
+        (result,) = tracker.step(bare(scene[index]))
+        assert_near(result.pose, scene.sightings(model.object_id)[index].T_cam_obj)
+    assert min(scene.sightings(model.object_id)[index].visible_fraction for index in range(34, 56, 2)) < 0.6
