@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import TypeGuard, TypeVar
 
 from tracker.cloud import LEAST_POINTS, lift
 from tracker.concept import ConceptModel
@@ -17,22 +17,26 @@ from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
 from tracker.view import ObjectView, view_object
 
+LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
 STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
 
 T = TypeVar("T")
-Asking = Generator[ObjectView, Saliency, T]  # asks for the saliency of a view, as often as it takes
+# Asks for the saliency of a view, as often as it takes; is given None where that is not to be had now.
+Asking = Generator[ObjectView, Saliency | None, T]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
     """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. expected:
     all poses that the object was expected at. masked: the pixels are known to be the object's; then it is looked for
-    in any pose too, where it is not clearly near the start."""
+    in any pose too, where it is not clearly near the start. contested: the next look is to be compared with it, however
+    clear it is."""
 
     mask: Mask
     start: Pose | None
     expected: Sequence[Pose] = ()
     masked: bool = False
+    contested: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,14 +55,38 @@ class Found:
         return self.hypothesis.evidence.score
 
 
+def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeGuard[Found]:
+    """Of pixels that are said to be the object's a pose has to explain enough. Elsewhere it has to be likely: less is
+    asked where it was expected while it is followed than of what is seen again or has jumped, so that a state does not
+    flicker."""
+    if isinstance(found, str):
+        return False
+    if found.masked:
+        return found.score >= config.accept
+    goes_on = followed and found.hypothesis.origin != "search"
+    likely = found.confidence >= (config.believe if goes_on else config.regain)
+    return likely and found.hypothesis.evidence.surface >= LEAST_SURFACE
+
+
+def why_not(found: Found | str) -> str:
+    """Why it is not believed."""
+    if isinstance(found, str):
+        return found
+    if found.missed:
+        return found.missed
+    judged = f"explains {found.score:.2f} of it" if found.masked else f"is right at {found.confidence:.0%}"
+    return f"poor fit: the best pose {judged}"
+
+
 class Looking:
-    """For one model."""
+    """For one model. waiting: whether it did without concepts that it asked for, since somebody set that to False."""
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
         self._search = Search(model, config)
         self._without_concepts = 0  # looks in a row that did without
         self._usual = 0.0  # score of what was believed last
+        self.waiting = False
 
     def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
         """The likeliest of what the looks find, no further than the first that leaves no doubt; or why there is
@@ -70,7 +98,7 @@ class Looking:
                 missed = missed if missed or best else seen
             elif best is None or seen.confidence > best.confidence:
                 best = seen
-            if best and self._clear(best):
+            if best and self._clear(best) and not (isinstance(look, Look) and look.contested):
                 break
         if best is None:
             return missed or "nothing in the picture looks like it"
@@ -79,6 +107,10 @@ class Looking:
     def came_of_it(self, score: float | None) -> None:
         """The score of what was believed, None where the object is lost: next time every place is looked at then."""
         self._usual = 1.0 if score is None else score
+
+    def concepts_agree(self) -> None:
+        """Somebody else has asked them."""
+        self._without_concepts = 0
 
     def outline(self, T_cam_obj: Pose, frame: Frame, clock: Stopwatch) -> Mask | str:
         """See `Search.outline`."""
@@ -91,12 +123,18 @@ class Looking:
         if view is None:
             return "no depth within the mask"
         sight = Sight.of(view, masked=look.masked)
+        continued = None
         if look.start is not None and self._without_concepts < self._config.concepts_every - 1:
             continued = self._found(self._search.continued(look.start, sight, clock), look)
             if continued and self._sure(continued):
                 self._without_concepts += 1
                 return continued
         saliency = yield view
+        if saliency is None:
+            self.waiting = True
+            if look.start is not None and continued is None:
+                continued = self._found(self._search.continued(look.start, sight, clock), look)
+            return continued or "its concepts are not known yet"
         self._without_concepts = 0
         with clock("cloud"):
             cloud = lift(view, saliency, self._config.cloud)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 
 from tracker.camera_motion import CameraMotion
 from tracker.claims import claimed_by_others, in_one_place
@@ -11,9 +12,11 @@ from tracker.config import TrackerConfig
 from tracker.errors import ConfigError, FrameError, LateFrameError
 from tracker.frame import Frame
 from tracker.geometry import Pose
+from tracker.lockstep import lockstep
 from tracker.places import Moment
 from tracker.pointing import Pointer
 from tracker.result import TrackResult
+from tracker.reviews import Answered, Reviews
 from tracker.saliency import Query, Saliency, SaliencyBackend, open_backend
 from tracker.stopwatch import Stopwatch
 from tracker.track import Track
@@ -23,7 +26,10 @@ from tracker.view import ObjectView
 class ObjectTracker:
     """Follows objects through the frames of one camera.
 
-    models: one concept model an object. backend: the one that made them; None opens it by name.
+    models: one concept model an object. backend: the one that made them; None opens it by name. worker: of one thread,
+    where the backend finds concepts while the tracker goes on by surface and colours alone: with a slow one it keeps
+    the frame rate. None: every frame that needs concepts waits for them. It is the caller's to shut down.
+
     Raises ModelError where a model is of another backend, ConfigError where two models are of the same object.
     """
 
@@ -32,6 +38,7 @@ class ObjectTracker:
         models: ConceptModel | Sequence[ConceptModel],
         config: TrackerConfig | None = None,
         backend: SaliencyBackend | None = None,
+        worker: Executor | None = None,
     ) -> None:
         models = [models] if isinstance(models, ConceptModel) else list(models)
         if not models:
@@ -43,6 +50,7 @@ class ObjectTracker:
         for model in models:
             model.require_backend(backend)
         self._backend = backend
+        self._reviews = Reviews(worker) if worker else None
         self._tracks = [Track(model, config) for model in models]
         self._camera = CameraMotion()
         self._config, self._last_stamp_ns, self._placed_ns = config, -1, -1
@@ -92,35 +100,40 @@ class ObjectTracker:
                 f"{what}, {before} ns"
             )
         self._last_stamp_ns = frame.stamp_ns
+        if self._reviews:
+            self._reviews.collect(self._camera)
         self._camera.advance(frame)
         claimed = claimed_by_others([track.shown for track in self._tracks])
         moments = [Moment(frame, self._camera, others, Stopwatch()) for others in claimed]
         steps = [track.step(now) for track, now in zip(self._tracks, moments, strict=True)]
-        results: dict[int, TrackResult] = {}
-
-        # Every object's step asks for the concepts of what it looks at, until it has a result. One batch answers all.
-        answers: dict[int, Saliency | None] = dict.fromkeys(range(len(steps)))
-        while answers:
-            asked: dict[int, ObjectView] = {}
-            for k, saliency in answers.items():
-                try:
-                    asked[k] = steps[k].send(saliency)  # pyright: ignore[reportArgumentType]: None starts a generator
-                except StopIteration as ended:
-                    results[k] = ended.value
-            answers = self._saliency(asked, moments)
+        results = lockstep(steps, dict.fromkeys if self._reviews else self._saliency(self._tracks, moments))
         if self._config.masks == "carried":
-            results |= self._one_at_a_place(moments)
-        return tuple(results[k] for k in range(len(steps)))
+            results = self._one_at_a_place(results, moments)
+        if self._reviews:
+            self._review(self._reviews, moments)
+        return tuple(results)
 
-    def _one_at_a_place(self, moments: Sequence[Moment]) -> dict[int, TrackResult]:
+    @property
+    def frames_without_concepts(self) -> int:
+        """In which an object asked for them while the worker was busy with an earlier frame."""
+        return self._reviews.skipped if self._reviews else 0
+
+    def _review(self, reviews: Reviews, moments: Sequence[Moment]) -> None:
+        """What the worker is to look at next, if it has time."""
+        offered = [(track, track.review(now), now) for track, now in zip(self._tracks, moments, strict=True)]
+        wanted = [(track, review, now) for track, review, now in offered if review]
+        answered = self._saliency([track for track, _, _ in wanted], [now for _, _, now in wanted])
+        reviews.offer([(track, review) for track, review, _ in wanted], answered)
+
+    def _one_at_a_place(self, results: Sequence[TrackResult], moments: Sequence[Moment]) -> list[TrackResult]:
         """Of two objects that explain the same pixels the surer one does; what is said of the other one instead."""
-        corrected = {}
+        corrected: dict[int, TrackResult] = {}
         for pair in in_one_place([track.shown for track in self._tracks]):
             kept, refused = sorted(pair, key=lambda k: self._tracks[k].surest, reverse=True)
             if refused not in corrected and kept not in corrected:
                 other = self._tracks[kept].object_id
                 corrected[refused] = self._tracks[refused].withdrawn(moments[refused], other)
-        return corrected
+        return [corrected.get(k, result) for k, result in enumerate(results)]
 
     def _track_of(self, object_id: str) -> Track:
         tracks = {track.object_id: track for track in self._tracks}
@@ -128,9 +141,12 @@ class ObjectTracker:
             raise ConfigError(f"there is no model of object {object_id!r}; there are {', '.join(tracks)}")
         return tracks[object_id]
 
-    def _saliency(self, views: Mapping[int, ObjectView], moments: Sequence[Moment]) -> dict[int, Saliency | None]:
-        if not views:
-            return {}
-        queries = [Query(view, self._tracks[k].labels) for k, view in views.items()]
-        with Stopwatch.shared([moments[k].clock for k in views], "saliency"):
-            return dict(zip(views, self._backend(queries), strict=True))
+    def _saliency(self, tracks: Sequence[Track], moments: Sequence[Moment]) -> Answered:
+        """Of what these objects look at, by position, in one batch; each bears its part of the time."""
+
+        def answered(views: Mapping[int, ObjectView]) -> dict[int, Saliency | None]:
+            queries = [Query(view, tracks[k].labels) for k, view in views.items()]
+            with Stopwatch.shared([moments[k].clock for k in views], "saliency"):
+                return dict(zip(views, self._backend(queries), strict=True))
+
+        return answered

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 
-from tracker.camera_motion import CameraMotion
+from tracker.camera_motion import CameraMotion, Landmarks
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
-from tracker.looking import Asking, Look, Looking
+from tracker.looking import Asking, Found, Look, Looking
 from tracker.pointing import Pointer
 from tracker.proposals import Proposals
 from tracker.stopwatch import Stopwatch
@@ -64,31 +64,39 @@ class Places:
         pointer, self._pointer = self._pointer, None
         self._there = self._proposals.pointed_out(pointer, now.frame) if mask is None and pointer else mask
         if mask is not None:
-            expected = () if predicted is None else (predicted,)
-            yield Look(mask, predicted, expected, masked=True) if mask.any() else "out of view: the mask is empty"
+            yield from self._within(mask, predicted, now)
         elif self._there is not None:
             yield Look(self._there, None)
         elif self._config.masks != "carried":
             yield f"no mask of object {self._model.object_id!r} was given"
         elif self._where.known:
-            moving = (predicted,) if predicted is not None and followed else ()
-            yield from self._near(chain(moving, self._where.expected(now.camera)), now, look)
+            yield from self._near(predicted if followed else None, now, look)
         elif (place_m := self._where.pointed_out_m(now.camera)) is not None:
             yield Look(now.unclaimed(self._proposals.around(place_m, now.frame)), None)
         else:
             yield "not seen yet"
 
-    def anywhere(self, now: Moment) -> Asking[list[Look] | str]:
-        """The likeliest places of the whole picture; or why there are none."""
-        if self._there is not None:
-            return "it was pointed out elsewhere"
+    @property
+    def pointed_out(self) -> bool:
+        """Whether somebody said where it is in this frame."""
+        return self._there is not None
+
+    def anywhere(self, now: Moment, look: Looking) -> Asking[Found | str]:
+        """The likeliest of what is found at the likeliest places of the whole picture; or why there is nothing."""
         picture = self._proposals.picture(now.frame, now.unclaimed(now.frame.depth_m > 0))
         if picture is None:
             return "no depth in the picture"
         saliency = yield picture
+        if saliency is None:
+            look.waiting = True
+            return "its concepts are not known yet"
         with now.clock("proposals"):
             masks = self._proposals.masks(picture, saliency, self._config.cloud)
-        return [Look(now.unclaimed(mask), None) for mask in masks]
+        return (yield from look.best([Look(now.unclaimed(mask), None) for mask in masks], now.frame, now.clock))
+
+    def suspected(self, T_then_obj: Pose, then: Landmarks | None, camera: CameraMotion) -> None:
+        """It has been seen in this frame or in an earlier one."""
+        self._where.suspected(T_then_obj, then, camera)
 
     def found(self, T_cam_obj: Pose, now: Moment) -> None:
         self._where.found(T_cam_obj, now.camera)
@@ -99,16 +107,32 @@ class Places:
         if self._there is not None:
             self._where.point_out(self._there, now.frame, now.camera)
 
-    def _near(self, expected: Iterable[Pose], now: Moment, look: Looking) -> Iterator[Look | str]:
-        """Near each pose, of which there is one at least; where it is clearly at none, anywhere around the first."""
+    def _within(self, mask: Mask, predicted: Pose | None, now: Moment) -> Iterator[Look | str]:
+        """Pixels that are known to be its own."""
+        if not mask.any():
+            yield "out of view: the mask is empty"
+            return
+        starts = [pose for pose in (predicted, self._where.suspect(now.camera)) if pose is not None]
+        if not starts:
+            yield Look(mask, None, masked=True)
+        for k, start in enumerate(starts):
+            contested = k < len(starts) - 1
+            yield Look(mask, start, tuple(starts[: k + 1]), masked=True, contested=contested)
+
+    def _near(self, moving: Pose | None, now: Moment, look: Looking) -> Iterator[Look | str]:
+        """Near each pose that is expected, of which there is one at least; where it is clearly at none, anywhere around
+        the first. moving: where it is if it moves on as it did, unless it was suspected elsewhere."""
+        contested = moving is not None and self._where.suspect(now.camera) is not None
         near: list[Pose] = []
-        for pose in expected:
-            if not any(self._same(pose, other) for other in near):
+        for pose in chain(() if moving is None else (moving,), self._where.expected(now.camera)):
+            if not any(self.same(pose, other) for other in near):
                 near.append(pose)
                 outline = look.outline(pose, now.frame, now.clock)
-                yield outline if isinstance(outline, str) else Look(outline, pose, tuple(near))
+                yield outline if isinstance(outline, str) else Look(outline, pose, tuple(near), contested=contested)
+                contested = False
         around = self._proposals.around((near[0] @ self._centre_m[None])[0], now.frame, MOVED_ON)
         yield Look(now.unclaimed(around), None, tuple(near))
 
-    def _same(self, a: Pose, b: Pose) -> bool:
+    def same(self, a: Pose, b: Pose) -> bool:
+        """So near that they are looked at once."""
         return a.angle_to_rad(b) < SAME_RAD and a.distance_to_m(b) < SAME_SHARE * self._model.diameter_m

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable, Iterator
+from functools import cached_property
 from typing import TypeGuard
 
 import numpy as np
 
+from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import Mask
 from tracker.geometry import Pose
-from tracker.looking import Asking, Found, Looking
+from tracker.looking import Asking, Found, Look, Looking, believed, why_not
 from tracker.places import Moment, Places
 from tracker.pointing import Pointer
 from tracker.pose_filter import PoseFilter
 from tracker.result import Surface, TrackResult, TrackState
+from tracker.reviews import Review, SecondLook
 
 logger = logging.getLogger(__name__)
 
 PLACED_SIGMA_RAD, PLACED_SIGMA_M = 0.1, 0.01  # how surely an object is where `place` says
-LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
 
 
 class Track:
@@ -36,6 +39,8 @@ class Track:
         self._filter = PoseFilter(config.filter)
         self._state = TrackState.INITIALISING
         self._frames_lost, self._frames_followed = 0, 0
+        self._looked: list[Look | str] = []
+        self._raw: Pose | None = None
         self.shown: Mask | None = None
         self.surest = False, 0.0
 
@@ -60,25 +65,43 @@ class Track:
 
     def step(self, now: Moment) -> Asking[TrackResult]:
         predicted = self._filter.predict(now.frame.stamp_ns) if self._config.prior else None
+        self._look.waiting, self._looked = False, []
 
         # 1. Is it where it is said, or expected, to be?
-        looks = self._places.looks(now, predicted, self._state is TrackState.TRACKING, self._look)
-        found = yield from self._look.best(looks, now.frame, now.clock)
+        looks = self._places.looks(now, predicted, self._followed, self._look)
+        found = yield from self._look.best(self._noted(looks), now.frame, now.clock)
 
         # 2. If not, is it anywhere in the picture? That takes a second frame to be believed.
         suspected = None
-        if self._carried and not self._believed(found) and self._frames_lost % self._config.search_every == 0:
-            places = yield from self._places.anywhere(now)
-            if not isinstance(places, str):
-                elsewhere = yield from self._look.best(places, now.frame, now.clock)
-                suspected = elsewhere.hypothesis.refined.T_cam_obj if self._believed(elsewhere) else None
+        if self._searched and not self._believed(found) and self._frames_lost % self._config.search_every == 0:
+            elsewhere = yield from self._places.anywhere(now, self._look)
+            suspected = elsewhere.hypothesis.refined.T_cam_obj if self._believed(elsewhere) else None
 
         # 3. What does that say about its pose, given where it has been?
         if self._believed(found):
             return self._tracked(now, found, predicted)
         if self._carried:
             self._places.not_found(now, suspected)
-        return self._lost(now, "seen again: the next frame has to confirm it" if suspected else self._why_not(found))
+        return self._lost(now, "seen again: the next frame has to confirm it" if suspected else why_not(found))
+
+    def review(self, now: Moment) -> Review | None:
+        """Of the frame of the last step, where it went without concepts that it asked for."""
+        if not self._look.waiting:
+            return None
+        again = self._second_look(self._looked, self._places if self._searched else None, now, self._followed)
+        return Review(again, self._raw, now.camera.now)
+
+    def reviewed(self, review: Review, found: Found, camera: CameraMotion) -> None:
+        """What was found of it in the frame of a review says where it is now: where it has been followed since then,
+        its motion is known."""
+        T_then_obj = found.hypothesis.refined.T_cam_obj
+        if self._raw is None:
+            self._places.suspected(T_then_obj, review.landmarks, camera)
+        elif review.believed is not None:
+            T_then_obj = self._model.symmetry.nearest(T_then_obj, review.believed)
+            self._look.concepts_agree()
+            if not self._places.same(T_then_obj, review.believed):
+                self._places.suspected(self._raw @ review.believed.inverse() @ T_then_obj, camera.now, camera)
 
     def withdrawn(self, now: Moment, other_id: str) -> TrackResult:
         """What was found in this frame is another object."""
@@ -90,30 +113,30 @@ class Track:
         self._filter = PoseFilter(self._config.filter)
         self._places.forget()
 
+    def _noted(self, looks: Iterable[Look | str]) -> Iterator[Look | str]:
+        for look in looks:
+            self._looked.append(look)
+            yield look
+
+    @cached_property
+    def _second_look(self) -> SecondLook:
+        return SecondLook(self._model, self._config)
+
+    @property
+    def _followed(self) -> bool:
+        return self._state is TrackState.TRACKING
+
     @property
     def _carried(self) -> bool:
         return self._config.masks == "carried"
 
-    def _believed(self, found: Found | str) -> TypeGuard[Found]:
-        """Of pixels that are said to be the object's a pose has to explain enough. Elsewhere it has to be likely: less
-        is asked where it was expected while it is tracked than of what is seen again or has jumped, so that a state
-        does not flicker."""
-        if isinstance(found, str):
-            return False
-        if found.masked:
-            return found.score >= self._config.accept
-        goes_on = self._state is TrackState.TRACKING and found.hypothesis.origin != "search"
-        likely = found.confidence >= (self._config.believe if goes_on else self._config.regain)
-        return likely and found.hypothesis.evidence.surface >= LEAST_SURFACE
+    @property
+    def _searched(self) -> bool:
+        """Whether the whole picture is, where nobody says where it is."""
+        return self._carried and not self._places.pointed_out
 
-    @staticmethod
-    def _why_not(found: Found | str) -> str:
-        if isinstance(found, str):
-            return found
-        if found.missed:
-            return found.missed
-        judged = f"explains {found.score:.2f} of it" if found.masked else f"is right at {found.confidence:.0%}"
-        return f"poor fit: the best pose {judged}"
+    def _believed(self, found: Found | str) -> TypeGuard[Found]:
+        return believed(found, self._followed, self._config)
 
     def _tracked(self, now: Moment, found: Found, predicted: Pose | None) -> TrackResult:
         stamp_ns, view = now.frame.stamp_ns, found.hypothesis.view
@@ -125,6 +148,7 @@ class Track:
             if filtered is None or not filtered.within_gate:  # verified, so the motion model is wrong, not the pose
                 filtered = self._filter.start(raw, information, stamp_ns)
         self._state, self._frames_lost, self._frames_followed = TrackState.TRACKING, 0, self._frames_followed + 1
+        self._raw = raw
         self.shown, self.surest = view.mask, (self._frames_followed > 1, found.confidence)
         self._look.came_of_it(found.score)
         self._places.found(raw, now)
@@ -144,7 +168,7 @@ class Track:
         )
 
     def _lost(self, now: Moment, reason: str) -> TrackResult:
-        self._frames_lost, self._frames_followed, self.shown = self._frames_lost + 1, 0, None
+        self._frames_lost, self._frames_followed, self._raw, self.shown = self._frames_lost + 1, 0, None, None
         if self._state is TrackState.TRACKING:
             logger.info("object %r lost at frame %d: %s", self._model.object_id, now.frame.index, reason)
             self._state = TrackState.LOST

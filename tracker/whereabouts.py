@@ -64,6 +64,14 @@ class Whereabouts:
             if place is not None:
                 yield place.now(camera)
 
+    def suspect(self, camera: CameraMotion) -> Pose | None:
+        """T_cam_obj in this frame of what has been seen and another frame has to confirm."""
+        return None if self._suspected is None else self._suspected.now(camera)
+
+    def suspected(self, T_then_obj: Pose, then: Landmarks | None, camera: CameraMotion) -> None:
+        """It has been seen in this frame or an earlier one, by whom nobody waited for."""
+        self._suspected = _Place(then, T_then_obj, T_then_obj).carried(camera)
+
     def pointed_out_m(self, camera: CameraMotion) -> Floats | None:
         """(3,) the place in this frame, in camera coordinates, that a mask pointed out."""
         return None if self._pointed_out is None else self._pointed_out.now(camera).translation_m
