@@ -16,6 +16,7 @@ from reference.self_alignment import SelfAlignment
 from tracker.concept import ConceptModel
 from tracker.errors import ConfigError
 from tracker.geometry import Floats
+from tracker.revolution import revolution_axis
 from tracker.symmetry import NO_SYMMETRY, Symmetry, about
 
 CONTINUUM = 24  # turns that stand for all
@@ -24,9 +25,6 @@ TURNS_A_ROUND = (6, 5, 4, 3, 2)
 # Of the points. A single turn that lays a face on itself says nothing of the others: half of what is known has to
 # speak. Of the turns about a free axis every one has, so a third at the least will do for each.
 LEAST_OVERLAP, LEAST_OVERLAP_OF_EACH = 0.5, 1 / 3
-# Of the diameter, how far the normals of a solid of revolution may miss its axis: less at every step, so that a handle
-# neither counts in the end nor decides at the start.
-FITTING_SIGMAS = np.geomspace(0.3, 0.01, 15)
 SQUARE_COSINE = np.sin(np.radians(10))  # faces nearer to square than this are taken for square
 FACE_COSINE = np.cos(np.radians(10))
 FACES = 4
@@ -80,27 +78,6 @@ def _most_turns(alignment: SelfAlignment, axis: Floats, origin_m: Floats) -> int
 
 def _fits(alignment: SelfAlignment, group: Symmetry) -> bool:
     return all(alignment.evidence(turn, group.origin_m).proves(LEAST_OVERLAP) for turn in group.turns[1:])
-
-
-def revolution_axis(model: ConceptModel) -> tuple[Floats, Floats]:
-    """Unit axis (3,) and a point (3,) on it that the normals of the surface meet, as those of a solid of revolution do.
-
-    The line through p along n meets the axis (a through o, moment m = o x a) where n . m + (p x n) . a = 0 (Pottmann
-    and Randrup, Rotational and helical surface approximation for reverse engineering, Computing 60, 1998): least
-    squares with |a| = 1 and m eliminated, reweighted so that a handle does not count (Geman-McClure).
-    """
-    centre_m = model.points.mean(axis=0)
-    points, normals = (model.points - centre_m) / model.diameter_m, model.normals
-    moments, weights = np.cross(points, normals), np.ones(len(model))
-    axis, moment = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-    for sigma in FITTING_SIGMAS:
-        of_axis, mixed = (weights[:, None] * moments).T @ moments, (weights[:, None] * normals).T @ moments
-        to_moment = -np.linalg.pinv((weights[:, None] * normals).T @ normals, rcond=1e-4, hermitian=True) @ mixed
-        axis = np.linalg.eigh(of_axis + mixed.T @ to_moment)[1][:, 0]
-        moment = to_moment @ axis
-        missed = normals @ moment + moments @ axis
-        weights = 1 / (1 + (missed / sigma) ** 2) ** 2
-    return axis, centre_m + np.cross(axis, moment) * model.diameter_m
 
 
 def _frames(model: ConceptModel) -> Iterator[Floats]:

@@ -28,7 +28,7 @@ ORDER = {
     "tracker": (
         "errors", "whole_file", "geometry", "frame", "first_masks", "in_order", "sources", "view", "pointing",
         "saliency", "cloud", "region", "reference_views",
-        "grounding", "symmetry", "declared_symmetry", "concept", "measures", "matching", "appearance",
+        "grounding", "symmetry", "declared_symmetry", "concept", "revolution", "measures", "matching", "appearance",
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
         "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "lockstep", "places",

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from reference.onboard import onboard, read_reference_frames
-from reference.symmetry_detection import detect_symmetry, revolution_axis
+from reference.symmetry_detection import detect_symmetry
 from tracker.concept import ConceptModel
 from tracker.declared_symmetry import parse_symmetry
 from tracker.geometry import Floats, Pose
@@ -141,21 +140,6 @@ def test_stripes_that_come_again_after_half_a_turn_are_not_taken_for_a_symmetry_
 
     found = detect_symmetry(cylinder(2 * np.pi, twice))
     assert found is NO_SYMMETRY
-
-
-def test_the_axis_of_a_solid_of_revolution_is_met_by_its_normals_even_beside_a_handle() -> None:
-    tin, handle = cylinder(2.5), box((0.02, 0.01, 0.06))
-    away = T_OBJ_BODY.rotation @ [0.06, 0.01, 0]
-    joined = replace(
-        tin,
-        points=np.concatenate((tin.points, handle.points[::8] + away)),
-        normals=np.concatenate((tin.normals, handle.normals[::8])),
-        colours=np.concatenate((tin.colours, handle.colours[::8])),
-    )
-    axis, point_m = revolution_axis(joined)
-    beside_m = np.cross(point_m - T_OBJ_BODY.translation_m, axis)
-    assert abs(axis @ T_OBJ_BODY.rotation[:, 2]) > np.cos(np.radians(3))
-    assert np.linalg.norm(beside_m) < 0.005
 
 
 @pytest.mark.parametrize("scene", ["turn", "tabletop"])

@@ -123,28 +123,39 @@ class Looking:
         if view is None:
             return "no depth within the mask"
         sight = Sight.of(view, masked=look.masked)
-        continued = None
-        if look.start is not None and self._without_concepts < self._config.concepts_every - 1:
-            continued = self._found(self._search.continued(look.start, sight, clock), look)
-            if continued and self._sure(continued):
-                self._without_concepts += 1
-                return continued
+        asks = self._without_concepts >= self._config.concepts_every - 1
+        continued = None if asks else self._continued(look, sight, clock)
+        if continued and self._sure(continued):
+            self._without_concepts += 1
+            return continued
         saliency = yield view
         if saliency is None:
             self.waiting = True
-            if look.start is not None and continued is None:
-                continued = self._found(self._search.continued(look.start, sight, clock), look)
-            return continued or "its concepts are not known yet"
+            return continued or self._continued(look, sight, clock) or "its concepts are not known yet"
         self._without_concepts = 0
         with clock("cloud"):
             cloud = lift(view, saliency, self._config.cloud)
         if len(cloud) < LEAST_POINTS:
             return f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
-        if look.start is not None and not look.masked:
-            hypothesis = self._search.near(look.start, sight, cloud, clock)
-        else:
-            hypothesis = self._search(sight, cloud, look.start, clock)
-        return self._found(hypothesis, look) or "poor fit: no pose explains what is seen"
+        best = None
+        if look.start is not None:
+            best = self._likeliest(None, self._search.near(look.start, sight, cloud, clock), look)
+        if look.start is None or (look.masked and (best is None or best.score < self._config.trust)):
+            best = self._likeliest(best, self._search.anywhere(sight, cloud, clock), look)
+        if best is None:
+            return "poor fit: no pose explains what is seen"
+        return self._likeliest(best, self._search.turned(best.hypothesis, sight, clock), look) or best
+
+    def _continued(self, look: Look, sight: Sight, clock: Stopwatch) -> Found | None:
+        hypothesis = None if look.start is None else self._search.continued(look.start, sight, clock)
+        return self._found(hypothesis, look) if hypothesis else None
+
+    def _likeliest(self, best: Found | None, hypotheses: Iterable[Hypothesis], look: Look) -> Found | None:
+        """The first of those that are most likely."""
+        for hypothesis in hypotheses:
+            found = self._found(hypothesis, look)
+            best = found if best is None or found.confidence > best.confidence else best
+        return best
 
     def _clear(self, found: Found) -> bool:
         """Whether nothing better is to be expected: it fits well or is likely, and fits not much worse than it did."""
@@ -157,9 +168,7 @@ class Looking:
         steady = continued.grounds.turn_rad is not None and continued.grounds.turn_rad < STEADY_RAD
         return steady and self._clear(continued) and continued.confidence >= self._config.sure
 
-    def _found(self, hypothesis: Hypothesis | None, look: Look) -> Found | None:
-        if hypothesis is None:
-            return None
+    def _found(self, hypothesis: Hypothesis, look: Look) -> Found:
         grounds = self._grounds(hypothesis, look.expected)
         return Found(hypothesis, grounds, confidence(grounds), look.masked)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 
 from tracker.appearance import ViewAppearance, view_appearance
@@ -17,10 +18,14 @@ from tracker.geometry import Pose
 from tracker.matching import Correspondences, Matcher
 from tracker.refinement import Refined, Refiner
 from tracker.registration import Candidate, register
+from tracker.revolution import TURNS, Turns
 from tracker.silhouette import Silhouette
 from tracker.stopwatch import Stopwatch
 from tracker.verification import Evidence, Verifier
 from tracker.view import ObjectView, view_object
+
+HALF_AS_GOOD = 0.5  # before refinement a turned pose explains less than it will
+TURNED, NEIGHBOUR_RAD = 2, 1.5 * 2 * np.pi / TURNS  # refined at most, none of them next to another
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,14 +63,8 @@ class Search:
         self._refine = Refiner(model, config.refinement, config.view.pixels_across)
         self._verify = Verifier(model, config.verification, config.view.pixels_across)
         self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
+        self._turns = Turns(model)
         self._matched: tuple[PointCloud, Correspondences] | None = None
-
-    def __call__(self, sight: Sight, cloud: PointCloud, predicted: Pose | None, clock: Stopwatch) -> Hypothesis | None:
-        """The pose that explains best what is seen, anywhere where none is clearly near a prediction; or None."""
-        found = None if predicted is None else self.near(predicted, sight, cloud, clock)
-        if found is None or found.evidence.score < self._config.trust:
-            found = preferred(found, self.anywhere(sight, cloud, clock), self._config)
-        return found
 
     def outline(self, T_cam_obj: Pose, frame: Frame) -> Mask | str:
         """(H, W) bool, where an object shows that is about at this pose, or why it does not."""
@@ -75,16 +74,16 @@ class Search:
         """The pose that surface and colours lead to from the prediction, without any concept."""
         return self._refined(predicted, sight, "prediction", clock)
 
-    def near(self, predicted: Pose, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> Hypothesis | None:
-        """The better of two poses near the prediction: by surfaces alone, and pulled by the concepts first."""
+    def near(self, predicted: Pose, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> list[Hypothesis]:
+        """Two poses near the prediction, or one: pulled by the concepts first, and by surfaces alone."""
         correspondences = self._correspondences(cloud, clock)
         with clock("closest points"):
             pulled = self._closest.align(self._closest.pull(predicted, correspondences, cloud), cloud)
             direct = self._closest.align(predicted, cloud)
-        found = self._refined(pulled, sight, "concepts", clock)
-        if direct and pulled and self._alike(direct, pulled):
-            return found
-        return better(self._refined(direct, sight, "prediction", clock), found)
+        found = [self._refined(pulled, sight, "concepts", clock)]
+        if not (direct and pulled and self._alike(direct, pulled)):
+            found.append(self._refined(direct, sight, "prediction", clock))
+        return [hypothesis for hypothesis in found if hypothesis]
 
     def _correspondences(self, cloud: PointCloud, clock: Stopwatch) -> Correspondences:
         """Which of the cloud's points is which point of the model? Of the last cloud they are kept."""
@@ -97,8 +96,8 @@ class Search:
         """So near that refinement brings them to the same pose."""
         return a.angle_to_rad(b) < 0.03 and a.distance_to_m(b) < 0.01 * self._model.diameter_m
 
-    def anywhere(self, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> Hypothesis | None:
-        """The best of the poses on which correspondences agree, wherever that is."""
+    def anywhere(self, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> list[Hypothesis]:
+        """The poses on which correspondences agree, wherever they are, that explain most of what is seen."""
         correspondences = self._correspondences(cloud, clock)
         with clock("registration"):
             generator = torch.Generator(self._device).manual_seed(self._config.seed)
@@ -106,12 +105,25 @@ class Search:
             candidates = self._inequivalent(candidates)
         with clock("verification"):
             candidates.sort(key=lambda candidate: -self._roughly(candidate.T_cam_obj, sight))
-        best = None
+        found = []
         for candidate in candidates[: self._config.verified]:
             with clock("closest points"):
                 closer = self._closest.align(candidate.T_cam_obj, cloud)
-            best = better(best, self._refined(closer, sight, "search", clock))
-        return best
+            found.append(self._refined(closer, sight, "search", clock))
+        return [hypothesis for hypothesis in found if hypothesis]
+
+    def turned(self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> list[Hypothesis]:
+        """The poses that its shape hardly tells from this one, those that explain most of what is seen."""
+        with clock("verification"):
+            worth = {pose: self._roughly(pose, sight) for pose in self._turns.of(hypothesis.refined.T_cam_obj)}
+        likely = [pose for pose in worth if worth[pose] > HALF_AS_GOOD * hypothesis.evidence.score]
+        likely = sorted(likely, key=lambda pose: -worth[pose])
+        chosen: list[Pose] = []
+        for pose in likely:
+            if len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
+                chosen.append(pose)
+        found = [self._refined(pose, sight, "search", clock) for pose in chosen]
+        return [hypothesis for hypothesis in found if hypothesis]
 
     def _inequivalent(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Those that the object's symmetry does not make the same as a better supported one."""
@@ -147,17 +159,3 @@ class Search:
                 return None
             view, appearance = own, view_appearance(own)
         return Hypothesis(refined, self._verify(refined.T_cam_obj, view, appearance), origin, view)
-
-
-def preferred(expected: Hypothesis | None, elsewhere: Hypothesis | None, config: TrackerConfig) -> Hypothesis | None:
-    """The expected pose, unless it is not acceptable or the one found elsewhere is clearly better."""
-    if expected is None or elsewhere is None or expected.evidence.score < config.accept:
-        return better(expected, elsewhere)
-    return elsewhere if elsewhere.evidence.score > expected.evidence.score + config.jump else expected
-
-
-def better(a: Hypothesis | None, b: Hypothesis | None) -> Hypothesis | None:
-    """The one with the higher score, the first of equals."""
-    if a is None or b is None:
-        return a or b
-    return a if a.evidence.score >= b.evidence.score else b

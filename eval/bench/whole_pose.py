@@ -61,8 +61,9 @@ def whole_pose() -> dict[str, Any]:
     tree = small_gicp.preprocess_points(model.points, downsampling_resolution=GRID_M)
 
     def from_scratch(seen: _Sighting, _: Pose) -> Pose:
-        found = search(seen.sight, seen.cloud, None, Stopwatch())
-        return found.refined.T_cam_obj if found else Pose.identity()
+        found = search.anywhere(seen.sight, seen.cloud, Stopwatch())
+        best = max(found, key=lambda hypothesis: hypothesis.evidence.score, default=None)
+        return best.refined.T_cam_obj if best else Pose.identity()
 
     def gicp(seen: _Sighting, start: Pose) -> Pose:
         cloud, _ = small_gicp.preprocess_points(seen.cloud.points, downsampling_resolution=GRID_M)
