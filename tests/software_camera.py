@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyrealsense2 as rs
+import pytest
 
 from tracker.frame import Frame
 from tracker.geometry import Intrinsics
+
+rs: Any = pytest.importorskip("pyrealsense2")
 
 UNIT_M = 0.0001  # so that depth of a rendered scene loses less than its noise
 
@@ -31,9 +33,9 @@ class SoftwareCamera:
         serial: str = "soft-1",
         unit_m: float = UNIT_M,
         period_ms: float = 1000 / 30,
-        colour_format: rs.format = rs.format.rgb8,
-        distortion: tuple[rs.distortion, Sequence[float]] = (rs.distortion.brown_conrady, (0.0,) * 5),
-        clock: rs.timestamp_domain = rs.timestamp_domain.hardware_clock,
+        colour_format: Any = rs.format.rgb8,
+        distortion: tuple[Any, Sequence[float]] = (rs.distortion.brown_conrady, (0.0,) * 5),
+        clock: Any = rs.timestamp_domain.hardware_clock,
     ) -> None:
         self.device = rs.software_device()
         self.device.register_info(rs.camera_info.name, "software camera")
@@ -56,7 +58,7 @@ class SoftwareCamera:
         """What is shown before a sensor is open nobody sees."""
         for _ in range(2000):
             if all(sensor.get_active_streams() for sensor in self._sensors.values()):
-                time.sleep(0.05)  # opened is not yet started
+                time.sleep(0.1)  # opened is not yet started
                 return
             time.sleep(0.005)
         raise AssertionError("nobody opened the camera")
@@ -92,9 +94,7 @@ class SoftwareCamera:
         self._sensors[kind].on_video_frame(sent)
 
 
-def _stream(
-    kind: rs.stream, pixels: rs.format, bytes_px: int, camera: Intrinsics, distortion: tuple[Any, Sequence[float]]
-) -> Any:
+def _stream(kind: Any, pixels: Any, bytes_px: int, camera: Intrinsics, distortion: tuple[Any, Sequence[float]]) -> Any:
     model = rs.intrinsics()
     model.width, model.height = camera.width, camera.height
     model.fx, model.fy, model.ppx, model.ppy = camera.fx, camera.fy, camera.cx, camera.cy

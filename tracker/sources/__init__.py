@@ -140,7 +140,13 @@ SOURCES: dict[str, Callable[[str], FrameSource]] = {
     "realsense": _realsense,
     "synthetic": _synthetic,
 }
+WITHOUT_MASKS = ("realsense",)  # kinds that never say where an object is
 ALONE = ("realsense",)  # kinds that may stand without an argument: the only one that there is
+
+
+def kind_of(name: str) -> str:
+    """What a source's name begins with, whether there is such a kind or not."""
+    return name.partition(":")[0].partition("?")[0]
 
 
 def open_source(name: str) -> FrameSource:
@@ -148,10 +154,9 @@ def open_source(name: str) -> FrameSource:
 
     Whoever needs its frames by position asks `require_recording` for them, whoever needs poses `require_posed`.
     """
-    kind, separator, argument = name.partition(":")
+    kind, (_, separator, argument) = kind_of(name), name.partition(":")
     if not separator:  # realsense?fps=60
-        kind, mark, query = name.partition("?")
-        argument = mark + query
+        argument = name[len(kind) :]
     if kind not in SOURCES or (not argument if separator else kind not in ALONE):
         raise SourceError(f"{name!r} is not a source; expected KIND:ARGUMENT with KIND one of {', '.join(SOURCES)}")
     return SOURCES[kind](argument)

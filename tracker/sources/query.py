@@ -14,7 +14,7 @@ def read_query(source: str, query: str, readers: Readers) -> dict[str, Any]:
     """The options that are given, read. source: as the user wrote it, the messages begin with it.
 
     readers: option -> what reads its text; it raises ValueError that says what it expected.
-    Raises SourceError that lists what there is where an option is unknown or twice there, or its value is no such thing.
+    Raises SourceError that lists what there is where an option is unknown or twice there, or its value is none.
     """
     given: dict[str, Any] = {}
     for part in query.split("&") if query else []:

@@ -16,7 +16,7 @@ from tracker.frame import Frame
 from tracker.handover import Handover
 from tracker.sources.pairing import Pair, Pairing
 from tracker.sources.realsense.conversion import Converter, shot_of
-from tracker.sources.realsense.devices import Streams, choose_streams
+from tracker.sources.realsense.devices import choose_streams
 from tracker.sources.realsense.request import Options
 from tracker.sources.tolerance import Tolerance
 
@@ -60,12 +60,14 @@ class RealSenseCamera:
         self.dropped, self.skipped = 0, 0
 
     def record(self, path: Path) -> None:
-        """From the next opening on, write all that comes to the file; after a loss, to one beside it (NAME-2.db3).
+        """From the next opening on, write all that comes to the file, in place of what is there; after a loss, to one
+        beside it (NAME-2.db3).
 
         Raises SourceError unless it is to be a .db3, which is all that the SDK writes.
         """
         if path.suffix.lower() != ".db3":
             raise SourceError(f"{path}: a RealSense camera is recorded as .db3; expected {path.with_suffix('.db3')}")
+        path.unlink(missing_ok=True)
         self._record = path
 
     def stop(self) -> None:
@@ -107,7 +109,7 @@ class RealSenseCamera:
     def _until_lost(self) -> Generator[Frame]:
         """Raises _NotThereError where the camera cannot be opened."""
         door: Handover[Any] = Handover(IN_FLIGHT, newest=True)
-        streams: Streams | None = None
+        device, streams = None, None
         try:
             try:
                 device = self._opened_device()
@@ -126,6 +128,7 @@ class RealSenseCamera:
             door.end()
             if streams is not None:
                 streams.stop()
+            device = None  # a recording is whole when its device is gone
             self.dropped += door.dropped
 
     def _opened_device(self) -> Any:
@@ -151,9 +154,11 @@ class RealSenseCamera:
                 if (pair.depth is None) != blind:
                     blind = pair.depth is None
                     logger.warning("%s: colour comes %s depth", self.name, "without" if blind else "again with")
+                if self.skipped < skipped_before + pairing.skipped:
+                    self.skipped = skipped_before + pairing.skipped
+                    logger.info("%s: %d first pictures without the other's are skipped", self.name, pairing.skipped)
                 yield pair
                 heard_at = time.monotonic()  # however long the taker had it
-            self.skipped = skipped_before + pairing.skipped
 
 
 class _NotThereError(Exception):

@@ -51,7 +51,10 @@ class Converter:
             raw_depth = np.zeros((self._lens.intrinsics.height, self._lens.intrinsics.width), np.uint16)
         else:
             self._last_unit_m = self._unit_m(pair.depth.picture, where)
-            raw_depth = np.asanyarray(self._registered(pair.depth.picture, colour).get_data())
+            try:
+                raw_depth = np.asanyarray(self._registered(pair.depth.picture, colour).get_data())
+            except RuntimeError as error:
+                raise FrameError(f"{where}: its depth cannot be registered to the colour ({error})") from error
         provenance = Provenance(where, pair.colour.clock, pair.skew_ns, self._last_unit_m)
         picture = np.asanyarray(colour.get_data())
         if self._order in ("yuyv", "uyvy") and picture.dtype == np.uint16:
@@ -101,6 +104,8 @@ def _are_registered(depth: Profile, colour: Profile, name: str) -> bool:
     try:
         between = depth.get_extrinsics_to(colour)
     except RuntimeError as error:
-        raise SourceError(f"{name}: where depth and colour camera stand to each other is not known ({error})") from error
+        raise SourceError(
+            f"{name}: where depth and colour camera stand to each other is not known ({error})"
+        ) from error
     same_place = np.array_equal(between.rotation, np.eye(3).ravel()) and not np.any(between.translation)
     return same_camera and same_lens and bool(same_place)

@@ -99,7 +99,9 @@ def choose_streams(sdk: Any, device: Any, options: Options, name: str) -> Stream
         if not fitting:
             listed = ", ".join(sorted({_described(p) for _, p in there})) or "none"
             asked = f"width={options.width} height={options.height} fps={options.fps}".replace("=None", "=any")
-            raise SourceError(f"{name}: there is no {stream} stream with {asked} in {', '.join(formats)}; it has {listed}")
+            raise SourceError(
+                f"{name}: there is no {stream} stream with {asked} in {', '.join(formats)}; it has {listed}"
+            )
         chosen[stream] = min(fitting, key=lambda found: _distance(found[1], formats))
     opened = tuple((s, tuple(p for owner, p in chosen.values() if owner is s)) for s in sensors)
     depth_sensor, units = chosen["depth"][0], sdk.option.depth_units

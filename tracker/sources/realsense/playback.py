@@ -68,7 +68,9 @@ class RealSenseFile:
         door: Handover[Any] = Handover(IN_FLIGHT, newest=False)
         ended, stopped = threading.Event(), self._sdk.playback_status.stopped
         playback.set_status_changed_callback(lambda status: ended.set() if status == stopped else None)
+        playback.pause()  # or one stream runs off before the other has started
         streams.start(door.put)
+        playback.resume()
         read, silent_s = 0, 0.0
         try:
             while silent_s < SILENCE_S:
