@@ -11,19 +11,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
+from reference.onboard import onboard, read_reference_frames
 from tests.software_camera import SoftwareCamera, rs
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import FrameError, MissingExtraError, SourceError
+from tracker.first_masks import FirstMasks
 from tracker.frame import Frame
 from tracker.geometry import Intrinsics
 from tracker.pipeline import ObjectTracker
 from tracker.result import TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources import LiveSource, length_of, open_source, require_recordable
+from tracker.sources.bop import BopScene
 from tracker.sources.lens import MODELS, Lens
 from tracker.sources.realsense import RealSenseCamera, RealSenseFile, open_realsense
 from tracker.sources.realsense.camera import Patience
@@ -496,3 +500,38 @@ def test_a_recorded_scene_is_tracked_as_the_scene_itself(
         assert played is not None
         assert direct.distance_to_m(played) < 0.001
         assert np.degrees(direct.angle_to_rad(played)) < 0.3
+
+
+def test_colours_of_half_the_resolution_are_rgb_too(watch: Callable[..., Watching]) -> None:
+    camera = SoftwareCamera(CAMERA, colour_format=rs.format.yuyv)
+    watching = watch(camera)
+    yuyv = cv2.cvtColor(np.full((120, 160, 3), (200, 90, 30), np.uint8), cv2.COLOR_RGB2YUV_YUYV)
+    camera.show(yuyv, plane())
+    assert np.abs(watching.until(1)[0].rgb.astype(int) - [200, 90, 30]).max() <= 3
+
+
+@pytest.mark.shared_data
+def test_a_real_recording_that_goes_through_a_camera_and_its_file_is_tracked_to_the_same_poses(
+    shared_data: Path, attributes: SaliencyBackend, watch: Callable[..., Watching], tmp_path: Path
+) -> None:
+    scene = BopScene(shared_data / "rbt", 1)
+    models = [onboard(read_reference_frames(scene, object_id, 2), attributes) for object_id in scene.object_ids]
+    given = [scene[index] for index in range(15)]
+    camera = SoftwareCamera(given[0].intrinsics, unit_m=0.001)
+    watching = watch(camera, record=tmp_path / "rbt.db3")
+    for k, frame in enumerate(given):
+        camera.show_frame(frame)
+        watching.until(k + 1)
+    watching.end()
+    played = list(open_source(f"realsense:{tmp_path / 'rbt.db3'}"))
+    assert len(played) == len(given)
+    trackers = [ObjectTracker(models, TrackerConfig(masks="carried"), attributes) for _ in range(2)]
+    first = [FirstMasks(), FirstMasks()]
+    for before, after in zip(given, played, strict=True):
+        results = [trackers[0].step(first[0](before)), trackers[1].step(first[1](replace(after, masks=before.masks)))]
+        for direct, of_camera in zip(*results, strict=True):
+            assert direct.state is of_camera.state is TrackState.TRACKING
+            assert direct.pose is not None
+            assert of_camera.pose is not None
+            assert direct.pose.distance_to_m(of_camera.pose) < 0.001
+            assert np.degrees(direct.pose.angle_to_rad(of_camera.pose)) < 0.1
