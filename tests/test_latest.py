@@ -44,6 +44,7 @@ def test_a_slow_tracker_gets_the_newest_frame_each_time_and_the_others_are_count
             taken.append(next(frames).index)
     assert taken == [4, 9, 14, 19, 24, 29]
     assert latest.dropped == 6 * 4
+    assert [count for what, count in latest.left_out.items() if what.startswith("dropped")] == [6 * 4]
 
 
 def test_a_tracker_that_is_fast_enough_gets_all_of_them() -> None:

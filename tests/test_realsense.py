@@ -231,7 +231,7 @@ def test_first_pictures_without_colour_are_skipped_and_counted(watch: Callable[.
         time.sleep(0.02)
     show(camera, watching, 2)
     assert [frame.rgb[0, 0, 0] for frame in watching.end()] == [3, 4]
-    assert watching.source.skipped == 3
+    assert [count for what, count in watching.source.left_out.items() if "at the start" in what] == [3]
 
 
 def test_colour_without_depth_is_a_frame_without_depth_and_is_told(
@@ -506,7 +506,7 @@ def test_colours_of_half_the_resolution_are_rgb_too(watch: Callable[..., Watchin
     camera = SoftwareCamera(CAMERA, colour_format=rs.format.yuyv)
     watching = watch(camera)
     yuyv = cv2.cvtColor(np.full((120, 160, 3), (200, 90, 30), np.uint8), cv2.COLOR_RGB2YUV_YUYV)
-    camera.show(yuyv, plane())
+    camera.show(np.asarray(yuyv, np.uint8), plane())
     assert np.abs(watching.until(1)[0].rgb.astype(int) - [200, 90, 30]).max() <= 3
 
 

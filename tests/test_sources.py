@@ -13,6 +13,7 @@ from reference.unposed import read_unposed_frames
 from tracker.errors import SourceError
 from tracker.frame import Frame
 from tracker.sources import (
+    POSED,
     SOURCES,
     PosedSource,
     length_of,
@@ -38,7 +39,7 @@ def every_source(bop_dataset: Path) -> dict[str, PosedSource]:
 def test_every_kind_opens_as_a_posed_source_that_is_called_as_the_user_called_it(
     every_source: dict[str, PosedSource],
 ) -> None:
-    assert {name.partition(":")[0] for name in every_source} == set(SOURCES)
+    assert {name.partition(":")[0] for name in every_source} == set(POSED)
     assert [type(source) for source in every_source.values()] == [BopScene, Folder, SyntheticScene]
     for name, source in every_source.items():
         assert isinstance(source, PosedSource)
@@ -66,7 +67,7 @@ def test_every_sighting_is_of_a_frame_that_has_a_mask_of_the_object(every_source
 
 @pytest.mark.parametrize("name", ["", "bop", "bop:", ":x", "webcam:0", "BOP:x:1", "/data/bop", "mug.concept"])
 def test_a_name_that_is_no_source_is_answered_with_the_kinds_that_there_are(name: str) -> None:
-    with pytest.raises(SourceError, match=f"{name!r} is not a source; .* one of bop, folder, synthetic"):
+    with pytest.raises(SourceError, match=f"{name!r} is not a source; .* one of {', '.join(SOURCES)}"):
         open_source(name)
 
 

@@ -109,8 +109,9 @@ class Track:
             lines.finish()
         if frames.refused:
             STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
-        if live and live.dropped:
-            STDERR.print(f"{live.dropped} frames dropped: newer ones had come before they could be tracked")
+        for what, count in live.left_out.items() if live else ():
+            if count:
+                STDERR.print(f"{count} frames {what}")
         if failure:
             raise failure
         if not self.quiet and not self.json:
