@@ -162,6 +162,12 @@ def test_what_is_no_camera_is_not_recorded(source: str, run: Run, tmp_path: Path
     assert list(tmp_path.iterdir()) == []
 
 
+def test_without_masks_there_has_to_be_a_prior(run: Run) -> None:
+    code, said = run("realsense", "--prior", "off")
+    assert code == 1
+    assert "realsense has no masks, so the tracker carries them on: it needs --prior on" in said
+
+
 # Faults
 
 

@@ -140,7 +140,11 @@ class Track:
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
-        masks = self.masks or ("carried" if kind_of(self.source) in WITHOUT_MASKS else None)
+        masks = self.masks
+        if masks is None and kind_of(self.source) in WITHOUT_MASKS:
+            if not config.prior:
+                raise ConfigError(f"{self.source} has no masks, so the tracker carries them on: it needs --prior on")
+            masks = "carried"
         if masks is not None:
             config = parse_config({**config.model_dump(), "masks": masks}, f"--masks {masks}")
         if self.smooth != "off" and not config.prior:
