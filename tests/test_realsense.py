@@ -36,7 +36,7 @@ from tracker.sources.realsense.request import Options, read_request
 
 CAMERA = Intrinsics(150.0, 151.0, 80.5, 59.0, 160, 120)
 LONG_S = 20.0
-QUICK = Patience(stall_s=0.3, wait_s=0.02)
+QUICK, CALM = Patience(stall_s=0.8, wait_s=0.02), Patience(stall_s=LONG_S)
 
 
 class Watching:
@@ -78,8 +78,9 @@ def watch() -> Iterator[Callable[..., Watching]]:
     started: list[Watching] = []
 
     def start(camera: SoftwareCamera | Callable[[], Any], record: Path | None = None, **options: Any) -> Watching:
+        one = isinstance(camera, SoftwareCamera)
         find = (lambda: camera.device) if isinstance(camera, SoftwareCamera) else camera
-        source = RealSenseCamera(rs, find, Options(**options), "realsense:soft-1", QUICK)
+        source = RealSenseCamera(rs, find, Options(**options), "realsense:soft-1", CALM if one else QUICK)
         if record is not None:
             source.record(record)
         started.append(Watching(source))
@@ -276,7 +277,7 @@ def test_a_camera_that_is_lost_and_comes_back_goes_on(
     assert [frame.index for frame in frames] == list(range(6))
     assert [frame.rgb[0, 0, 0] for frame in frames] == [0, 1, 2] * 2
     told = [record.message for record in caplog.records]
-    assert "realsense:soft-1 is lost (no pictures for 0.3 s); it is looked for again" in told
+    assert "realsense:soft-1 is lost (no pictures for 0.8 s); it is looked for again" in told
     assert any(message.startswith("realsense:soft-1 is back after") for message in told)
 
 

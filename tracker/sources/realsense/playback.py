@@ -91,6 +91,8 @@ class RealSenseFile:
                 else:
                     silent_s += POLL_S
             raise SourceError(f"{self._path}: the recording is damaged: nothing comes after {read} pictures")
+        except RuntimeError as error:
+            raise SourceError(f"{self._path}: the recording cannot be played back ({error})") from error
         finally:
             begun.set()
             door.end()  # the SDK's threads may wait before it
