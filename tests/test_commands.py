@@ -278,7 +278,7 @@ def test_an_empty_folder_holds_no_results(model: Path, run: Run, tmp_path: Path)
     ("source", "options", "words"),
     [
         ("synthetic:kitchen", (), ("'kitchen'", "tabletop")),
-        ("webcam:0", (), ("webcam:0", "bop, folder, synthetic")),
+        ("webcam:0", (), ("webcam:0", "one of bop, folder, ")),
         ("bop:/nowhere:1", (), ("/nowhere",)),
         (SOURCE, ("--config", "unknown.yaml"), ("'colour'", "prior", "verification", "filter")),
         (SOURCE, ("--config", "deep.yaml"), ("'filter.speed'", "acceleration_mps2", "gate")),
@@ -389,6 +389,15 @@ def test_a_run_that_is_stopped_keeps_what_was_smoothed_too(
     interrupted(KeyboardInterrupt())
     assert "stopped" in run("tracker", SOURCE, "--model", model, "--smooth", "offline", "--out", tmp_path / "out").err
     assert len((tmp_path / "out" / "poses.jsonl").read_text().splitlines()) == 3
+
+
+def test_a_source_of_nobody_knows_how_many_frames_is_tracked_to_its_end(
+    model: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracker.sources, "open_source", lambda _: iter(open_scene(SCENE)))
+    said = run("tracker", SOURCE, "--model", model)
+    assert said.code == 0, said.err
+    assert "tracked" in said.err
 
 
 def test_frames_that_come_late_are_left_out_and_counted(model: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

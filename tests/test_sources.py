@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from reference.onboard import read_reference_frames
+from reference.unposed import read_unposed_frames
 from tracker.errors import SourceError
-from tracker.sources import SOURCES, PosedSource, open_source, require_object
+from tracker.frame import Frame
+from tracker.sources import (
+    POSED,
+    SOURCES,
+    PosedSource,
+    length_of,
+    open_source,
+    require_object,
+    require_posed,
+    require_recording,
+)
 from tracker.sources.bop import BopScene
 from tracker.sources.folder import Folder
 from tracker.sources.synthetic import SyntheticScene
@@ -20,13 +33,13 @@ def every_source(bop_dataset: Path) -> dict[str, PosedSource]:
     scene = bop_dataset / "test" / "000003"
     (scene / "cam_K.txt").write_text("60 0 23\n0 61 17\n0 0 1\n")
     names = (f"bop:{bop_dataset}:3", f"folder:{scene}", "synthetic:still?size=160x120&frames=3")
-    return {name: open_source(name) for name in names}
+    return {name: require_posed(open_source(name)) for name in names}
 
 
 def test_every_kind_opens_as_a_posed_source_that_is_called_as_the_user_called_it(
     every_source: dict[str, PosedSource],
 ) -> None:
-    assert {name.partition(":")[0] for name in every_source} == set(SOURCES)
+    assert {name.partition(":")[0] for name in every_source} == set(POSED)
     assert [type(source) for source in every_source.values()] == [BopScene, Folder, SyntheticScene]
     for name, source in every_source.items():
         assert isinstance(source, PosedSource)
@@ -54,7 +67,7 @@ def test_every_sighting_is_of_a_frame_that_has_a_mask_of_the_object(every_source
 
 @pytest.mark.parametrize("name", ["", "bop", "bop:", ":x", "webcam:0", "BOP:x:1", "/data/bop", "mug.concept"])
 def test_a_name_that_is_no_source_is_answered_with_the_kinds_that_there_are(name: str) -> None:
-    with pytest.raises(SourceError, match=f"{name!r} is not a source; .* one of bop, folder, synthetic"):
+    with pytest.raises(SourceError, match=f"{name!r} is not a source; .* one of {', '.join(SOURCES)}"):
         open_source(name)
 
 
@@ -66,7 +79,26 @@ def test_a_bop_source_needs_the_number_of_a_scene(argument: str) -> None:
 
 def test_a_path_may_have_colons(bop_dataset: Path) -> None:
     moved = bop_dataset.rename(bop_dataset.with_name("at 12:30:45"))
-    assert len(open_source(f"bop:{moved}:3")) == 3
+    assert length_of(open_source(f"bop:{moved}:3")) == 3
+
+
+class Camera:
+    """A source whose frames come once, and nobody knows how many."""
+
+    name = "camera:7"
+
+    def __iter__(self) -> Iterator[Frame]:
+        return iter(())
+
+
+def test_a_camera_has_no_length_and_whoever_needs_poses_is_told_who_has_them() -> None:
+    assert length_of(Camera()) is None
+    for ask in (require_posed, lambda camera: read_reference_frames(camera, "mug", 2)):
+        with pytest.raises(SourceError, match=r"camera:7 has no poses of objects; .*: bop, folder, synthetic"):
+            ask(Camera())
+    for ask in (require_recording, lambda camera: read_unposed_frames(camera, "mug", 2)):
+        with pytest.raises(SourceError, match="camera:7 has no frames by position, they come once"):
+            ask(Camera())
 
 
 def test_an_object_that_a_source_does_not_know_is_answered_with_those_that_it_knows(

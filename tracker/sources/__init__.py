@@ -1,9 +1,10 @@
-"""Where frames come from: `open_source("bop:PATH:SCENE")` and the two protocols that a source may fulfil."""
+"""Where frames come from: `open_source("bop:PATH:SCENE")` and the protocols that a source may fulfil."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from tracker.errors import SourceError
@@ -35,17 +36,70 @@ class Sighting:
 
 
 @runtime_checkable
-class PosedSource(FrameSource, Protocol):
-    """A recording with known poses: frames by position, and where each object is in them."""
+class Recording(FrameSource, Protocol):
+    """Frames by position, as often as they are asked for."""
 
     def __len__(self) -> int: ...
 
     def __getitem__(self, index: int) -> Frame: ...
 
+
+@runtime_checkable
+class PosedSource(Recording, Protocol):
+    """A recording with known poses: where each object is in its frames."""
+
     @property
     def object_ids(self) -> tuple[str, ...]: ...
 
     def sightings(self, object_id: str) -> Sequence[Sighting]: ...
+
+
+def length_of(source: FrameSource) -> int | None:
+    """How many frames the source has; None where nobody knows, as of a camera."""
+    return len(source) if isinstance(source, Sized) else None
+
+
+@runtime_checkable
+class LiveSource(FrameSource, Protocol):
+    """A camera: time goes on while nobody looks, and frames come once.
+
+    `stop` ends them soon, from any thread. left_out: how many frames never came out, by what became of them.
+    """
+
+    def stop(self) -> None: ...
+
+    @property
+    def left_out(self) -> Mapping[str, int]: ...
+
+
+@runtime_checkable
+class Recordable(LiveSource, Protocol):
+    """A camera that can write what it sees to a file of its own kind while it is looked at."""
+
+    def record(self, path: Path) -> None: ...
+
+
+def require_recording(source: FrameSource) -> Recording:
+    """The source itself. Raises SourceError where its frames come once, as those of a camera."""
+    if not isinstance(source, Recording):
+        raise SourceError(f"{source.name} has no frames by position, they come once; expected a recording")
+    return source
+
+
+def require_posed(source: FrameSource) -> PosedSource:
+    """The source itself. Raises SourceError where it has no poses of objects, or no frames by position."""
+    if not isinstance(source, PosedSource):
+        raise SourceError(
+            f"{source.name} has no poses of objects; expected a recording of a kind that may: {', '.join(POSED)}"
+        )
+    return source
+
+
+def require_recordable(source: FrameSource) -> Recordable:
+    """The source itself. Raises SourceError where it is no camera whose pictures can be written to a file."""
+    if not isinstance(source, Recordable):
+        raise SourceError(f"{source.name} cannot be recorded; expected a camera: realsense or realsense:SERIAL")
+    return source
 
 
 def require_object(source: PosedSource, object_id: str) -> None:
@@ -54,6 +108,9 @@ def require_object(source: PosedSource, object_id: str) -> None:
         raise SourceError(
             f"{source.name} has no poses of object {object_id!r}; it has {', '.join(source.object_ids) or 'none'}"
         )
+
+
+POSED = ("bop", "folder", "synthetic")
 
 
 def _bop(argument: str) -> PosedSource:
@@ -71,18 +128,41 @@ def _folder(argument: str) -> PosedSource:
     return Folder(argument)
 
 
+def _realsense(argument: str) -> FrameSource:
+    from tracker.sources.realsense import open_realsense
+
+    return open_realsense(argument)
+
+
 def _synthetic(argument: str) -> PosedSource:
     from tracker.sources.synthetic import open_scene
 
     return open_scene(argument)
 
 
-SOURCES: dict[str, Callable[[str], PosedSource]] = {"bop": _bop, "folder": _folder, "synthetic": _synthetic}
+SOURCES: dict[str, Callable[[str], FrameSource]] = {
+    "bop": _bop,
+    "folder": _folder,
+    "realsense": _realsense,
+    "synthetic": _synthetic,
+}
+WITHOUT_MASKS = ("realsense",)  # kinds that never say where an object is
+ALONE = ("realsense",)  # kinds that may stand without an argument: the only one that there is
 
 
-def open_source(name: str) -> PosedSource:
-    """`KIND:ARGUMENT` -> the source. Raises SourceError where kind, path or content is not what it needs."""
-    kind, separator, argument = name.partition(":")
-    if kind not in SOURCES or not separator or not argument:
+def kind_of(name: str) -> str:
+    """What a source's name begins with, whether there is such a kind or not."""
+    return name.partition(":")[0].partition("?")[0]
+
+
+def open_source(name: str) -> FrameSource:
+    """`KIND:ARGUMENT` -> the source. Raises SourceError where kind, path or content is not what it needs.
+
+    Whoever needs its frames by position asks `require_recording` for them, whoever needs poses `require_posed`.
+    """
+    kind, (_, separator, argument) = kind_of(name), name.partition(":")
+    if not separator:  # realsense?fps=60
+        argument = name[len(kind) :]
+    if kind not in SOURCES or (not argument if separator else kind not in ALONE):
         raise SourceError(f"{name!r} is not a source; expected KIND:ARGUMENT with KIND one of {', '.join(SOURCES)}")
     return SOURCES[kind](argument)
