@@ -30,6 +30,7 @@ from tracker.errors import SourceError
 from tracker.frame import Frame
 from tracker.sources.synthetic import open_scene
 from tracker.verification import Evidence
+from tracker.view import bounding_box
 
 BOX = "tea_box"
 SCENE = f"turn?size=160x120&frames=6&object={BOX}"
@@ -284,7 +285,10 @@ def test_an_empty_folder_holds_no_results(model: Path, run: Run, tmp_path: Path)
         (SOURCE, ("--config", "deep.yaml"), ("'filter.speed'", "acceleration_mps2", "gate")),
         (SOURCE, ("--config", "wrong.yaml"), ("accept", "less than or equal to 1")),
         (SOURCE, ("--config", "absent.yaml"), ("absent.yaml",)),
-        (SOURCE, ("--model", "{model}"), ("two models", BOX)),
+        (SOURCE, ("--at", "9,9"), ("masks", "carried")),
+        (SOURCE, ("--masks", "carried", "--at", "left"), ("'left'", "X,Y")),
+        (SOURCE, ("--masks", "carried", "--at", "cup=9,9"), ("'cup'", BOX)),
+        (SOURCE, ("--masks", "carried", "--model", "{model}", "--at", "9,9"), ("of which object", f"{BOX}_2")),
         (SOURCE, ("--model", "unknown.yaml"), ("unknown.yaml", "concept model")),
         (SOURCE, ("--model", "[bold]we[/]ird.concept"), ("[bold]we[/]ird.concept",)),
     ],
@@ -311,6 +315,27 @@ def test_tracker_refuses_what_it_does_not_know_and_leaves_no_folder(
 def test_a_picture_without_a_folder_to_put_it_is_refused(program: str, model: Path, run: Run) -> None:
     what = (SOURCE, "--model", model) if program == "tracker" else ("track", "--dataset", SOURCE)
     assert_refused(run(program, *what, "--view", "overlay"), "--view overlay", "--out")
+
+
+def test_tracker_takes_a_box_in_place_of_a_mask_and_two_of_a_kind(model: Path, run: Run) -> None:
+    """Of the second one, which is not there, there is no pose."""
+    box = bounding_box(open_scene(SCENE)[0].masks[BOX])
+    assert box is not None
+    at = ("--at", f"{BOX}={','.join(map(str, box))}")
+    said = run("tracker", SOURCE, "--model", model, "--model", model, "--masks", "carried", *at, "--json")
+    assert said.code == 0, said.err
+    lines = [json.loads(line) for line in said.out.splitlines()]
+    assert {line["object"] for line in lines} == {BOX, f"{BOX}_2"}
+    assert {line["state"] for line in lines if line["object"] == BOX} == {"tracking"}
+    assert {line["T_cam_obj"] for line in lines if line["object"] == f"{BOX}_2"} == {None}
+
+
+def test_concepts_may_come_later(model: Path, run: Run) -> None:
+    said = run("tracker", SOURCE, "--model", model, "--concepts", "later", "--json")
+    assert said.code == 0, said.err
+    lines = [json.loads(line) for line in said.out.splitlines()]
+    assert len(lines) == 6
+    assert lines[0]["reason"] == "its concepts are not known yet"
 
 
 def test_tracker_wants_a_model(run: Run) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import safetensors.numpy
 
-from tracker.concept import ARRAYS, FORMAT_VERSION, ConceptModel
+from tracker.concept import ARRAYS, FORMAT_VERSION, ConceptModel, told_apart
 from tracker.declared_symmetry import parse_symmetry
 from tracker.errors import ModelError, OutputError
 from tracker.saliency import SaliencyBackend
@@ -245,3 +245,10 @@ def test_a_model_of_another_backend_or_other_settings_is_refused_and_told_how_to
             other.require_backend(attributes)
         for part in (repr(other.object_id), other.backend, other.fingerprint, attributes.fingerprint):
             assert part in str(caught.value)
+
+
+def test_two_of_a_kind_are_told_apart_by_name(can_model: ConceptModel) -> None:
+    mug = replace(can_model, object_id="mug")
+    named = told_apart([can_model, mug, can_model, can_model])
+    assert [model.object_id for model in named] == ["soup_can", "mug", "soup_can_2", "soup_can_3"]
+    assert all(model.points is can_model.points for model in named)

@@ -21,3 +21,4 @@ def test_each_object_is_pointed_out_once_where_enough_of_it_is_seen() -> None:
     seen = [set(first(replace(frame, masks=masks)).masks) for masks in given]
     assert seen == [{"mug"}, {"can"}, set(), set()]
     assert set(FirstMasks()(replace(frame, masks=given[2])).masks) == {"mug", "can"}
+    assert set(FirstMasks(["can"])(replace(frame, masks=given[2])).masks) == {"mug"}

@@ -15,7 +15,11 @@ from rich.table import Table
 from tracker.terminal import STDERR, progress, run
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from tracker.concept import ConceptModel
     from tracker.config import TrackerConfig
+    from tracker.pointing import Pointer
     from tracker.sources import FrameSource
 
 
@@ -26,7 +30,8 @@ class Track:
     source: tyro.conf.Positional[str]
     """bop:PATH:SCENE, folder:PATH, synthetic:NAME, realsense, realsense:SERIAL or realsense:FILE.db3."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE"), tyro.conf.UseAppendAction]
-    """Concept model that python -m reference made; once for every object."""
+    """Concept model that python -m reference made; once for every object. Of two of a kind, the same file twice: the
+    second one is called NAME_2."""
     out: Path | None = None
     """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view makes."""
     weights: str | None = None
@@ -39,6 +44,12 @@ class Track:
     """Where the object's pixels come from: given by the source in every frame, or carried on by the tracker from the
     first that is given; where none is, it looks for the object in the whole picture. Default: as the config says
     (given); carried where the source has no masks."""
+    at: Annotated[tuple[str, ...], tyro.conf.arg(metavar="[NAME=]X,Y[,X1,Y1]"), tyro.conf.UseAppendAction] = ()
+    """Where an object is in the first frame: a pixel on it, or a box around it. NAME may be left out where there is one
+    object. With --masks carried, in place of a mask."""
+    concepts: Literal["now", "later"] = "now"
+    """later: a worker finds the concepts while the tracker goes on without them, so that a slow backend does not hold
+    up the frames. What it comes to depends on how fast that is."""
     prior: Literal["on", "off"] | None = None
     """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
     config: Path | None = None
@@ -57,7 +68,9 @@ class Track:
     """No progress bar and no table."""
 
     def __call__(self) -> None:
-        from tracker.concept import ConceptModel
+        from concurrent.futures import ThreadPoolExecutor
+
+        from tracker.concept import ConceptModel, told_apart
         from tracker.config import dump_config
         from tracker.errors import ConfigError, TrackerError
         from tracker.first_masks import FirstMasks
@@ -72,15 +85,19 @@ class Track:
         config = self._config()
         if not self.model:
             raise ConfigError("--model: at least one concept model is needed; python -m reference makes one")
-        models = [ConceptModel.load(path) for path in self.model]
+        models = told_apart([ConceptModel.load(path) for path in self.model])
         backend = open_backend(models[0].backend, BackendOptions(self.weights, self.device))
-        tracker = ObjectTracker(models, config, backend)
         regions = {model.object_id: {c: model.locate(c, backend) for c in self.locate} for model in models}
         source = self._opened_source()
         live = Latest(source) if isinstance(source, LiveSource) else None
-        summary, first_masks = _Summary(), FirstMasks()
+        pointed_out = dict(self._pointers(models))
+        summary, first_masks = _Summary(), FirstMasks(pointed_out)
         failure: TrackerError | None = None
         with ExitStack() as stack:
+            worker = stack.enter_context(ThreadPoolExecutor(1)) if self.concepts == "later" else None
+            tracker = ObjectTracker(models, config, backend, worker)
+            for object_id, there in pointed_out.items():
+                tracker.point_out(object_id, there)
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
             viewer = OverlayVideo(folder / "overlay.mp4", models) if folder and self.view == "overlay" else NullViewer()
             stack.callback(viewer.close)
@@ -112,10 +129,24 @@ class Track:
         for what, count in live.left_out.items() if live else ():
             if count:
                 STDERR.print(f"{count} frames {what}")
+        if tracker.frames_without_concepts:
+            STDERR.print(f"{tracker.frames_without_concepts} frames went without concepts that were asked for")
         if failure:
             raise failure
         if not self.quiet and not self.json:
             STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
+
+    def _pointers(self, models: Sequence[ConceptModel]) -> Iterator[tuple[str, Pointer]]:
+        """Raises ConfigError where it is not clear which object is meant, or where it is."""
+        from tracker.errors import ConfigError
+        from tracker.pointing import parse_pointer
+
+        for text in self.at:
+            name, separator, there = text.rpartition("=")
+            if not separator and len(models) > 1:
+                known = ", ".join(model.object_id for model in models)
+                raise ConfigError(f"--at {text}: of which object? Write NAME={text}, NAME one of {known}")
+            yield name if separator else models[0].object_id, parse_pointer(there)
 
     def _opened_source(self) -> FrameSource:
         """Raises SourceError and OutputError, also where it cannot be recorded as it is asked for."""

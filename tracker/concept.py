@@ -6,7 +6,9 @@ On disk it is a safetensors file: arrays and a JSON header, nothing that could r
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -184,3 +186,14 @@ def _check_arrays(path: Path, arrays: dict[str, np.ndarray], concepts: int) -> N
     for name, shape in shapes.items():
         if arrays[name].shape != shape or not np.isfinite(arrays[name]).all():
             raise ModelError(f"{path}: {name} has shape {arrays[name].shape} (expected {shape}) or is not finite")
+
+
+def told_apart(models: Sequence[ConceptModel]) -> list[ConceptModel]:
+    """The models, the second and further ones of an object named NAME_2, NAME_3: so many of the kind are tracked."""
+    seen: Counter[str] = Counter()
+    named = []
+    for model in models:
+        seen[model.object_id] += 1
+        count = seen[model.object_id]
+        named.append(model if count == 1 else replace(model, object_id=f"{model.object_id}_{count}"))
+    return named

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +13,10 @@ LEAST_PX = 400  # as of a reference frame: what is pointed out has to be seen
 
 
 class FirstMasks:
-    """Takes from every frame the masks of objects that were pointed out in an earlier one."""
+    """Takes from every frame the masks of objects that were pointed out in an earlier one, or are in another way."""
 
-    def __init__(self) -> None:
-        self._pointed_out: set[str] = set()
+    def __init__(self, pointed_out: Iterable[str] = ()) -> None:
+        self._pointed_out = set(pointed_out)
 
     def __call__(self, frame: Frame) -> Frame:
         """The frame with the masks of those objects alone of which enough is seen for the first time."""
