@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
 
@@ -17,8 +17,9 @@ from eval.bop_results import Estimate
 from eval.datasets import Dataset, MaskKind, category_of
 from eval.frame_record import FrameRecord
 from eval.instances import ObjectInImage
-from eval.peers import method_kind, open_method
+from eval.peers import Method, method_kind, open_method
 from eval.summary import TrackingCounts
+from reference.completion import Completion
 from reference.onboard import onboard, read_reference_frames
 from reference.unposed import onboard_unposed, read_unposed_frames
 from reference.vocabulary import VocabularySet
@@ -29,6 +30,7 @@ from tracker.first_masks import FirstMasks
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.in_order import InOrder
+from tracker.pipeline import ObjectTracker
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.smoothing import smooth_results
@@ -48,7 +50,8 @@ class Protocol:
     concepts: only the first so many of them, all where there are fewer. method: "ours", or a peer as `eval.peers` has
     it. initialisation: "gt" tells the method each object's true pose, once a scene, in the first frame where the object
     is visible. masks: which the dataset's frames have, those that models are made of too. unposed: reference frames are
-    spread over the scene, and of their poses only the first one's is told, which sets the object frame.
+    spread over the scene, and of their poses only the first one's is told, which sets the object frame. complete:
+    models grow by frames of which the tracker is sure, once those are tracked.
 
     Raises ConfigError where the method does not exist, or cannot do with that initialisation, with no view or concept,
     or where there are no filtered poses to smooth."""
@@ -64,6 +67,7 @@ class Protocol:
     masks: MaskKind = "visib"
     smooth: Literal["off", "offline"] = "off"
     unposed: bool = False
+    complete: bool = False
 
     def __post_init__(self) -> None:
         if self.views < 1:
@@ -74,6 +78,8 @@ class Protocol:
             raise ConfigError(
                 f"method {self.method} is given the masks of every frame: --masks carried is of no use to it"
             )
+        if self.complete and self.method != "ours":
+            raise ConfigError(f"method {self.method} has a model once and for all: --complete is of no use to it")
         if self.smooth != "off" and (self.method != "ours" or self.poses != "filtered" or not self.config.prior):
             raise ConfigError(
                 f"--smooth {self.smooth} smooths this tracker's filtered poses: it needs --method ours, "
@@ -163,6 +169,7 @@ def track_scene(
         return tracked
     tracker = open_method(protocol.method, models, protocol.config, protocol.backend)
     truth, visible = _truth(source, [model.object_id for model in models])
+    growing = _Growing(tracker, models, protocol) if protocol.complete else None
     first_masks = FirstMasks()
     untold = [model.object_id for model in models] if protocol.initialisation == "gt" else []
     shown = viewer(models)
@@ -176,7 +183,9 @@ def track_scene(
             given = frame if protocol.config.masks == "given" else first_masks(frame)
             results = tracker.step(given)
             shown.show(frame, results, truth[frame.index])
-            steps.append((frame.index, [replace(result, surface=None) for result in results]))
+            if growing:
+                growing.take(frame, results)
+            steps.append((frame.index, [result.slim() for result in results]))
     finally:
         shown.close()
     if frames.refused:
@@ -185,6 +194,20 @@ def track_scene(
         seen = [(index, result.object_id) in visible for result in results]
         _record(tracked, dataset, scene_id, index, results, seen, protocol)
     return tracked
+
+
+class _Growing:
+    """The models of one scene, which the tracker goes on with as they grow."""
+
+    def __init__(self, tracker: Method, models: Sequence[ConceptModel], protocol: Protocol) -> None:
+        self._tracker = tracker
+        self._completions = {m.object_id: Completion(m, protocol.backend, protocol.config) for m in models}
+
+    def take(self, frame: Frame, results: Sequence[TrackResult]) -> None:
+        for result in results:
+            model = self._completions[result.object_id].consider(frame, result)
+            if model is not None and isinstance(self._tracker, ObjectTracker):
+                self._tracker.exchange(model)
 
 
 def _smoothed(steps: Sequence[tuple[int, Sequence[TrackResult]]]) -> Iterator[tuple[int, Sequence[TrackResult]]]:

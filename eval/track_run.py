@@ -28,6 +28,7 @@ MASKS = {
     "carried": "carried by the tracker from the dataset's first visible mask of each object and scene",
 }
 UNPOSED = "found by the tracker; the first one's true pose sets the object frame"
+COMPLETED = "models grow by frames that were tracked, after they were, where the tracker is sure of its pose"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,7 @@ class TrackRun:
     poses: Literal["filtered", "raw"] = "filtered"
     smooth: Literal["off", "offline"] = "off"
     unposed: bool = False
+    complete: bool = False
     object_ids: tuple[str, ...] | None = None
     threads: int = 1
 
@@ -87,6 +89,7 @@ class TrackRun:
             concepts=self.concepts,
             masks=self.given_masks,
             unposed=self.unposed,
+            complete=self.complete,
         )
 
     def stated(self, backend: SaliencyBackend) -> dict[str, object]:
@@ -98,6 +101,7 @@ class TrackRun:
             "concepts": (self.concepts or "all of the vocabulary") if kind.concepts else "not used by the method",
             "views": self.views,
             "reference_poses": UNPOSED if self.unposed else "true ones",
+            "completion": COMPLETED if self.complete else "none: models stay as they are",
             "masks": MASKS[self.masks],
             "reinitialisation": "by the method itself, never from the truth",
             "poses": self.poses,
@@ -126,6 +130,7 @@ class TrackRun:
             "poses": self.poses,
             "smooth": self.smooth,
             "unposed": self.unposed,
+            "complete": self.complete,
             "threads": self.threads,
             "code": code_fingerprint(),
             "packages": package_versions(),

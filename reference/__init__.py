@@ -11,11 +11,16 @@ from typing import TYPE_CHECKING, Any
 from reference.onboard import onboard, read_reference_frames
 
 if TYPE_CHECKING:
+    from reference.completion import Completion
     from reference.unposed import onboard_unposed, read_unposed_frames
 
-_LATE = {"onboard_unposed": "reference.unposed", "read_unposed_frames": "reference.unposed"}
+_LATE = {
+    "Completion": "reference.completion",
+    "onboard_unposed": "reference.unposed",
+    "read_unposed_frames": "reference.unposed",
+}
 
-__all__ = ["onboard", "onboard_unposed", "read_reference_frames", "read_unposed_frames"]
+__all__ = ["Completion", "onboard", "onboard_unposed", "read_reference_frames", "read_unposed_frames"]
 
 
 def __getattr__(name: str) -> Any:

@@ -8,6 +8,7 @@ others: what went wrong along a chain shows where its ends meet.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,12 +73,18 @@ class Registration:
 class GrowingModel:
     """frames: those that are together. model: of them. left_out: the others, by name and with the reason."""
 
-    def __init__(self, registration: Registration, first: PosedFrame) -> None:
+    def __init__(self, registration: Registration, frames: Sequence[PosedFrame], model: ConceptModel) -> None:
+        """frames: those that the model was made of."""
         self._registration = registration
-        self.frames: list[PosedFrame] = [first]
-        self.model = registration.model(self.frames)
+        self.frames, self.model = list(frames), model
         self.left_out: list[str] = []
         self._colours = self._colours_found_again(self.model, self.frames)
+
+    def copy(self) -> GrowingModel:
+        """As it is now."""
+        other = copy(self)
+        other.frames, other.left_out = list(self.frames), list(self.left_out)
+        return other
 
     def take(self, waiting: Sequence[PosedFrame]) -> None:
         """Frames, whose poses are not looked at, as long as one of them is registered surely. The surest comes first:
@@ -91,7 +98,7 @@ class GrowingModel:
                 for frame, result in zip(waiting, results, strict=True):
                     self._leave_out(frame, self._unsure(result))
                 return
-            self._join(replace(waiting.pop(surest), T_cam_obj=T_cam_obj))
+            self.join(replace(waiting.pop(surest), T_cam_obj=T_cam_obj))
 
     def settle(self) -> None:
         """Register each frame but the first to a model of the others. One that is surely elsewhere there contradicts
@@ -116,25 +123,27 @@ class GrowingModel:
         if self._explained(model, settled) > self._explained(self.model, self.frames):
             self.frames, self.model = settled, model
 
-    def _join(self, frame: PosedFrame) -> None:
+    def join(self, frame: PosedFrame) -> bool:
+        """A frame whose pose is known. False where it contradicts those that are together, and is left out."""
         for earlier in self.frames:
             denied = self._registration.surface_denied(frame, earlier, self.model.diameter_m)
             if denied > MOST_DENIED:
                 self._leave_out(frame, f"{denied:.0%} of its surface and that in {name_of(earlier.frame)} contradict")
-                return
+                return False
         try:
             model = self._registration.model([*self.frames, frame])
         except OnboardingError as error:
             self._leave_out(frame, str(error))
-            return
+            return False
         colours = self._colours_found_again(model, [*self.frames, frame])
         for earlier, before, after in zip(self.frames, self._colours, colours, strict=False):
             if after < before - MOST_FADED:
                 name, lost = name_of(earlier.frame), "is not found where it was"
                 faded = f"agrees with the colours to {after:.2f} instead of {before:.2f}"
                 self._leave_out(frame, f"with it, {name} {faded if after else lost}")
-                return
+                return False
         self.frames, self.model, self._colours = [*self.frames, frame], model, colours
+        return True
 
     def _colours_found_again(self, model: ConceptModel, frames: Sequence[PosedFrame]) -> list[float]:
         """How well the colours of each frame agree with the model's; 0 where it is not found at its own pose."""

@@ -6,20 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reference.viewsphere import icosphere_directions, nearest_direction, widest_sampling
+from reference.viewsphere import icosphere_directions, nearest_direction, view_direction, widest_sampling
 from tracker.errors import OnboardingError
-from tracker.geometry import Floats
 from tracker.sources import Sighting
 
 SUBDIVISIONS = 3  # 642 directions, 4 to 5 degrees apart: finer differences of view do not matter
 LEAST_VISIBLE_SHARE = 0.3  # of the best visible frame's visible fraction: less of it teaches next to nothing
 LEAST_VISIBLE_PX = 400
-
-
-def view_direction(sighting: Sighting) -> Floats:
-    """(3,) unit vector in object coordinates, from the object's origin towards the camera."""
-    towards = sighting.T_cam_obj.inverse().translation_m
-    return towards / max(float(np.linalg.norm(towards)), 1e-12)
 
 
 def choose_reference_frames(sightings: Sequence[Sighting], count: int) -> list[Sighting]:
@@ -44,7 +37,7 @@ def choose_reference_frames(sightings: Sequence[Sighting], count: int) -> list[S
         )
     usable.sort(key=lambda s: (-s.visible_px, s.index))
     sphere = icosphere_directions(SUBDIVISIONS)
-    nodes = nearest_direction(np.stack([view_direction(s) for s in usable]), sphere)
+    nodes = nearest_direction(np.stack([view_direction(s.T_cam_obj) for s in usable]), sphere)
     first = np.sort(np.unique(nodes, return_index=True)[1])  # the best visible frame at each direction, best first
     worth = np.array([usable[i].visible_fraction for i in first]) / best_fraction
     picked = widest_sampling(sphere[nodes[first]], count, worth)

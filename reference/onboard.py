@@ -13,6 +13,7 @@ from reference.fusion import DEPTH_SLACK, diameter_of, fuse
 from reference.keyframes import choose_reference_frames
 from reference.quality import judge
 from reference.symmetry_detection import detect_symmetry
+from reference.viewsphere import view_direction
 from tracker.cloud import LEAST_POINTS, CloudConfig, inliers, lift
 from tracker.concept import ConceptModel
 from tracker.errors import OnboardingError
@@ -84,7 +85,7 @@ def joined_model(
     model = ConceptModel(
         object_id=frames[0].object_id,
         diameter_m=diameter_m,
-        view_directions=np.stack([_direction(frame) for frame in frames]),
+        view_directions=np.stack([view_direction(frame.T_cam_obj) for frame in frames]),
         labels=labels,
         backend=backend.name,
         fingerprint=backend.fingerprint,
@@ -139,8 +140,3 @@ def _diameter(surfaces: Sequence[Floats], frames: Sequence[PosedFrame]) -> float
         for k, points in enumerate(surfaces)
     ]
     return diameter_of(np.concatenate(checked))
-
-
-def _direction(frame: PosedFrame) -> Floats:
-    towards = frame.T_cam_obj.inverse().translation_m
-    return towards / np.linalg.norm(towards)

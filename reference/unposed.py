@@ -80,7 +80,7 @@ def onboard_unposed(
     if not given:
         first = replace(first, T_cam_obj=Pose(np.eye(3), surface_of(first, config.view, config.cloud).mean(axis=0)))
     registration = Registration(backend, config, vocabulary, symmetry, least_confidence)
-    growing = GrowingModel(registration, first)
+    growing = GrowingModel(registration, [first], registration.model([first]))
     growing.take([PosedFrame(frame, object_id, Pose.identity(), mask) for frame, mask in frames[1:]])
     growing.settle()
     if growing.left_out and len(growing.frames) == 1:

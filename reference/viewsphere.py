@@ -6,10 +6,16 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from tracker.geometry import Floats
+from tracker.geometry import Floats, Pose
 
 SAME_RAD = 1e-6  # directions nearer than this are copies
 ALIKE_RAD = 0.05  # sets that differ by less than this are equally wide: directions are snapped to a sphere before
+
+
+def view_direction(T_cam_obj: Pose) -> Floats:
+    """(3,) unit vector in object coordinates, from the object's origin towards the camera."""
+    towards = T_cam_obj.inverse().translation_m
+    return towards / max(float(np.linalg.norm(towards)), 1e-12)
 
 
 def icosphere_directions(subdivisions: int) -> Floats:

@@ -36,7 +36,7 @@ ORDER = {
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
-        "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "unposed",
+        "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "completion", "unposed",
         "plate", "__main__",
     ),
 }  # fmt: skip

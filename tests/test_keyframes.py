@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from reference.keyframes import LEAST_VISIBLE_PX, choose_reference_frames, view_direction
-from reference.viewsphere import farthest_point_sampling, icosphere_directions
+from reference.keyframes import LEAST_VISIBLE_PX, choose_reference_frames
+from reference.viewsphere import farthest_point_sampling, icosphere_directions, view_direction
 from tracker.errors import OnboardingError
 from tracker.geometry import Floats, Pose
 from tracker.sources import Sighting
@@ -46,14 +46,16 @@ def test_the_direction_of_a_view_is_towards_the_camera_however_far_and_however_h
     azimuth_deg: float, elevation_deg: float, roll_deg: float, distance_m: float
 ) -> None:
     a, e = np.radians((azimuth_deg, elevation_deg))
-    towards = view_direction(sighting(0, azimuth_deg, elevation_deg, distance_m=distance_m, roll_deg=roll_deg))
+    towards = view_direction(
+        sighting(0, azimuth_deg, elevation_deg, distance_m=distance_m, roll_deg=roll_deg).T_cam_obj
+    )
     assert towards == pytest.approx([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], abs=1e-9)
 
 
 def test_the_direction_turns_with_the_object_s_axes() -> None:
     seen, G = sighting(0, 30, 40), Pose.exp([0.3, -0.5, 1.0, 0, 0, 0])
     turned = Sighting(0, seen.T_cam_obj @ G.inverse(), 1000, 1.0)
-    assert np.allclose(view_direction(turned), G.rotation @ view_direction(seen))
+    assert np.allclose(view_direction(turned.T_cam_obj), G.rotation @ view_direction(seen.T_cam_obj))
 
 
 def test_the_best_visible_frame_comes_first_and_the_opposite_view_second() -> None:
@@ -77,9 +79,11 @@ def test_chosen_views_are_as_wide_as_sampling_from_any_start_and_do_not_depend_o
     chosen = choose_reference_frames(views, count)
     assert len(chosen) == count
     assert indices(views[::-1], count) == [s.index for s in chosen]
-    directions = np.stack([view_direction(s) for s in views])
+    directions = np.stack([view_direction(s.T_cam_obj) for s in views])
     widest = max(least_angle_deg(directions[farthest_point_sampling(directions, count, k)]) for k in range(len(views)))
-    assert least_angle_deg(np.stack([view_direction(s) for s in chosen])) > widest - 11  # snapped and compared roughly
+    assert (
+        least_angle_deg(np.stack([view_direction(s.T_cam_obj) for s in chosen])) > widest - 11
+    )  # snapped and compared roughly
 
 
 def test_a_camera_that_passes_by_gives_its_two_ends_wherever_the_object_is_seen_best() -> None:

@@ -32,6 +32,10 @@ def mug_scene() -> SyntheticScene:
     return open_scene("turn?size=320x240&object=mug")
 
 
+def started(registration: Registration, first: PosedFrame) -> GrowingModel:
+    return GrowingModel(registration, [first], registration.model([first]))
+
+
 def given(scene: SyntheticScene, object_id: str, *indices: int) -> Given:
     frames = [scene[index] for index in indices]
     return [(frame, frame.masks[object_id]) for frame in frames]
@@ -185,7 +189,7 @@ def test_surfaces_at_a_wrong_pose_contradict_each_other(
 def test_a_frame_that_is_placed_wrongly_but_surely_does_not_join(
     mug_scene: SyntheticScene, attributes: SaliencyBackend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    growing = GrowingModel(registration(attributes), posed(mug_scene, "mug", 44))
+    growing = started(registration(attributes), posed(mug_scene, "mug", 44))
     before = growing.model
     wrong = posed(mug_scene, "mug", 52, (0.25, 0, 0.25, 0, 0, 0)).T_cam_obj
     monkeypatch.setattr(Registration, "sure", lambda self, result: wrong)  # noqa: ARG005
@@ -198,7 +202,7 @@ def test_a_frame_that_is_painted_otherwise_does_not_join(
     can_scene: SyntheticScene, attributes: SaliencyBackend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Surfaces do not contradict each other, but the model of both does not look like the first one any more."""
-    growing = GrowingModel(registration(attributes), posed(can_scene, "soup_can", 44))
+    growing = started(registration(attributes), posed(can_scene, "soup_can", 44))
     right = posed(can_scene, "soup_can", 52)
     frame = replace(right.frame, rgb=np.ascontiguousarray(right.frame.rgb[..., [2, 1, 0]]))
     monkeypatch.setattr(Registration, "sure", lambda self, result: right.T_cam_obj)  # noqa: ARG005
@@ -208,7 +212,7 @@ def test_a_frame_that_is_painted_otherwise_does_not_join(
 
 
 def test_where_a_chain_meets_a_contradicting_frame_goes(mug_scene: SyntheticScene, attributes: SaliencyBackend) -> None:
-    growing = GrowingModel(registration(attributes), posed(mug_scene, "mug", 44))
+    growing = started(registration(attributes), posed(mug_scene, "mug", 44))
     growing.frames += [posed(mug_scene, "mug", 52), posed(mug_scene, "mug", 48, (0, 0.35, 0, 0, 0, 0))]
     growing.settle()
     assert [frame.frame.index for frame in growing.frames] == [44, 52]

@@ -7,7 +7,6 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -76,7 +75,7 @@ class PoseLines:
             self._write(frame_index, result)
         else:  # the depth picture of every frame is held only where it is asked for
             asked = bool(self._regions[result.object_id])
-            self._held.append((frame_index, result if asked else replace(result, surface=None)))
+            self._held.append((frame_index, result if asked else result.slim()))
 
     def finish(self) -> None:
         """There are no more frames."""

@@ -87,6 +87,14 @@ class ObjectTracker:
             )
         track.point_out(there)
 
+    def exchange(self, model: ConceptModel) -> None:
+        """Take a model that knows more of an object for the one that there is; it is tracked on from where it is.
+
+        Raises ConfigError where there is no model of the object, ModelError where this one is of another backend.
+        """
+        model.require_backend(self._backend)
+        self._track_of(model.object_id).exchange(model)
+
     def step(self, frame: Frame) -> tuple[TrackResult, ...]:
         """Every model's result, in their order.
 

@@ -38,12 +38,17 @@ class Places:
     """For one model."""
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
-        self._model, self._config = model, config
-        self._proposals = Proposals(model, config.proposals, config.matching, config.torch_device)
-        self._centre_m = model.points.mean(axis=0)
+        self._config = config
         self._where = Whereabouts()
         self._pointer: Pointer | None = None
         self._there: Mask | None = None
+        self.exchange(model)
+
+    def exchange(self, model: ConceptModel) -> None:
+        """For another one of the same object."""
+        config, self._model = self._config, model
+        self._proposals = Proposals(model, config.proposals, config.matching, config.torch_device)
+        self._centre_m = model.points.mean(axis=0)
 
     def told(self, T_cam_obj: Pose) -> None:
         """Somebody says that it was there, in the last frame or since."""

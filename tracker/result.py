@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 
 from tracker.concept import ConceptModel
 from tracker.confidence import Grounds
+from tracker.frame import Mask
 from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.pose_filter import FilterStep
 from tracker.projection import nearest_pixels, project
@@ -51,7 +52,9 @@ class TrackResult:
     covariance: (6, 6) of `pose`, of (turn, radians; shift, metres) in camera axes about the object's origin. reason:
     why there is no pose, or how it came about. raw_pose: T_cam_obj of this frame alone, before the filter. grounds:
     what the confidence was judged by. timings_ms: stage -> milliseconds. surface: what was seen of the object, None
-    without a pose. step: what the filter knew, for `tracker.smoothing`."""
+    without a pose. mask: (H, W) bool, the pixels by which it was judged, those that were given or, where masks are
+    carried, that the tracker takes for the object's; None without a pose. step: what the filter knew, for
+    `tracker.smoothing`."""
 
     stamp_ns: int
     object_id: str
@@ -64,12 +67,17 @@ class TrackResult:
     grounds: Grounds | None
     timings_ms: dict[str, float]
     surface: Surface | None = None
+    mask: Mask | None = None
     step: FilterStep | None = None
 
     @property
     def evidence(self) -> Evidence | None:
         """What the picture says of the pose, None without one."""
         return None if self.grounds is None else self.grounds.evidence
+
+    def slim(self) -> TrackResult:
+        """Without pictures, to be kept."""
+        return replace(self, surface=None, mask=None)
 
     def locate(self, concept: str | Region) -> SeenRegion | None:
         """Where a concept of the object is in this frame. None without a pose, or where the object does not have it.

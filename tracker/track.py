@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator
-from functools import cached_property
 from typing import TypeGuard
 
 import numpy as np
@@ -36,6 +35,7 @@ class Track:
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
         self._look, self._places = Looking(model, config), Places(model, config)
+        self._second_look: SecondLook | None = None
         self._filter = PoseFilter(config.filter)
         self._state = TrackState.INITIALISING
         self._frames_lost, self._frames_followed = 0, 0
@@ -63,6 +63,12 @@ class Track:
         self._places.point_out(there)
         self._state = TrackState.INITIALISING
 
+    def exchange(self, model: ConceptModel) -> None:
+        """For one that knows more of the same object, in the same object frame. It goes on where it is."""
+        self._model = model
+        self._look, self._second_look = Looking(model, self._config), None
+        self._places.exchange(model)
+
     def step(self, now: Moment) -> Asking[TrackResult]:
         predicted = self._filter.predict(now.frame.stamp_ns) if self._config.prior else None
         self._look.waiting, self._looked = False, []
@@ -88,6 +94,7 @@ class Track:
         """Of the frame of the last step, where it went without concepts that it asked for."""
         if not self._look.waiting:
             return None
+        self._second_look = self._second_look or SecondLook(self._model, self._config)
         again = self._second_look(self._looked, self._places if self._searched else None, now, self._followed)
         return Review(again, self._raw, now.camera.now)
 
@@ -117,10 +124,6 @@ class Track:
         for look in looks:
             self._looked.append(look)
             yield look
-
-    @cached_property
-    def _second_look(self) -> SecondLook:
-        return SecondLook(self._model, self._config)
 
     @property
     def _followed(self) -> bool:
@@ -164,6 +167,7 @@ class Track:
             grounds=found.grounds,
             timings_ms=now.clock.timings_ms(),
             surface=Surface(self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera),
+            mask=view.mask,
             step=filtered.step,
         )
 

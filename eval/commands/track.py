@@ -47,6 +47,9 @@ class Track:
     unposed: bool = False
     """Make models without the poses of their reference frames, but the first one's, which sets the object frame. They
     are spread over the scene; without it, they are picked by their poses."""
+    complete: bool = False
+    """Let models grow while their objects are tracked, by frames of sides that they do not know and of whose poses the
+    tracker is sure."""
     masks: Literal["visib", "full", "carried"] = "visib"
     """Where the object's pixels come from: the dataset's masks of what can be seen; those of the whole silhouette, also
     where something hides it (BOP's mask/); or its first visible one alone, which the tracker carries on by itself."""
@@ -171,6 +174,7 @@ class Track:
             poses=self.poses,
             smooth=self.smooth,
             unposed=self.unposed,
+            complete=self.complete,
             object_ids=self.objects,
             threads=self.threads,
         )

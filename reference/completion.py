@@ -1,0 +1,96 @@
+"""A model that grows while its object is tracked, by sides that it does not know yet."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+
+import numpy as np
+
+from reference.growing import GrowingModel, Registration, name_of
+from reference.keyframes import LEAST_VISIBLE_PX
+from reference.viewsphere import view_direction
+from tracker.concept import ConceptModel
+from tracker.config import TrackerConfig
+from tracker.frame import Frame, Mask, PosedFrame
+from tracker.geometry import Pose
+from tracker.result import TrackResult
+from tracker.saliency import SaliencyBackend
+
+logger = logging.getLogger(__name__)
+
+MOST_VIEWS = 12
+LEAST_CONFIDENCE = 0.9  # of a pose by which a frame joins
+APART_RAD = np.radians(20)  # from every view that the model is made of, and from those that it refused
+WATCHED, MOST_FALLEN = 15, 0.15  # results before and after a frame joined, and how far their mean confidence may fall
+
+
+class Completion:
+    """Of one model. Frames join it in which its object is surely where the tracker says, seen from elsewhere than in
+    those that it is made of, and that contradict none of them. Where the tracker is less sure of its poses afterwards,
+    the frame is taken out again.
+
+    model: the last one. refused: frames that did not join or were taken out, by name and with the reason.
+    """
+
+    def __init__(
+        self,
+        model: ConceptModel,
+        backend: SaliencyBackend,
+        config: TrackerConfig | None = None,
+        most_views: int = MOST_VIEWS,
+    ) -> None:
+        config = (config or TrackerConfig()).model_copy(update={"prior": False, "masks": "given"})
+        self._registration = Registration(backend, config, model.labels, model.symmetry, LEAST_CONFIDENCE)
+        self._growing = GrowingModel(self._registration, model.references, model)
+        self._most_views = most_views
+        self._seen_from = list(model.view_directions)
+        self._before: deque[float] = deque(maxlen=WATCHED)
+        self._since: list[float] = []
+        self._smaller: GrowingModel | None = None
+
+    @property
+    def model(self) -> ConceptModel:
+        return self._growing.model
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        return tuple(self._growing.left_out)
+
+    def consider(self, frame: Frame, result: TrackResult) -> ConceptModel | None:
+        """result: of the frame. The model to go on with, for `ObjectTracker.exchange`, where it is another one now."""
+        if result.raw_pose is None or result.mask is None:
+            return None
+        if self._smaller is not None:
+            return self._watched(result.confidence)
+        self._before.append(result.confidence)
+        if not self._teaches(result.raw_pose, result.mask, result.confidence):
+            return None
+        smaller = self._growing.copy()
+        self._seen_from.append(view_direction(result.raw_pose))
+        if not self._growing.join(PosedFrame(frame, result.object_id, result.raw_pose, result.mask)):
+            return None
+        logger.info("the model of object %r grows by %s", result.object_id, name_of(frame))
+        self._smaller, self._since = smaller, []
+        return self.model
+
+    def _teaches(self, T_cam_obj: Pose, mask: Mask, confidence: float) -> bool:
+        """Whether it is surely there, and a side is seen that the model may not know."""
+        cosines = np.array(self._seen_from) @ view_direction(T_cam_obj)
+        elsewhere = len(self._growing.frames) < self._most_views and bool((cosines < np.cos(APART_RAD)).all())
+        return elsewhere and confidence >= LEAST_CONFIDENCE and int(mask.sum()) >= LEAST_VISIBLE_PX
+
+    def _watched(self, confidence: float) -> ConceptModel | None:
+        """The way back."""
+        self._since.append(confidence)
+        if len(self._since) < WATCHED:
+            return None
+        smaller, self._smaller = self._smaller, None
+        fallen = float(np.mean(self._before) - np.mean(self._since))
+        if smaller is None or fallen <= MOST_FALLEN:
+            return None
+        taken_out = self._growing.frames[-1].frame
+        smaller.left_out.append(f"{name_of(taken_out)}: with it, poses are less sure by {fallen:.2f}")
+        logger.info("the model of object %r is the smaller one again: %s", self.model.object_id, smaller.left_out[-1])
+        self._growing = smaller
+        return self.model
