@@ -16,7 +16,7 @@ from tracker.symmetry import Symmetry
 from tracker.verification import Evidence
 
 MEASURES = ("colour", "explained", "turn_sigma", "turn", "not_expected", "constant")
-WEIGHTS = np.array([3.02, 0.91, -2.79, -0.59, 0.60, -17.24])
+WEIGHTS = np.array([2.79, 1.39, -2.96, -0.46, 1.06, -17.61])
 LEAST_INFORMATION = 1e-6  # of a direction that the data leave free
 LEAST = 0.02  # a share or an angle nearer to 0 than this says no more than this
 
