@@ -27,7 +27,10 @@ class Track:
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE"), tyro.conf.UseAppendAction]
     """Concept model that python -m reference made; once for every object."""
     out: Path | None = None
-    """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view makes."""
+    """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view and --write make."""
+    write: tuple[Literal["ob-in-cam", "tum", "bop"], ...] = ()
+    """Poses in these formats too: ob-in-cam (FoundationPose: ob_in_cam/NAME.txt, a 4x4 matrix a frame; a folder an
+    object where there are several), tum (tum/OBJECT.txt, a trajectory for evo), bop (results.csv)."""
     weights: str | None = None
     """Weights of the backend that made the models: a size, a name on the hub, or a folder."""
     device: str = "auto"
@@ -59,8 +62,9 @@ class Track:
         from tracker.errors import ConfigError, TrackerError
         from tracker.first_masks import FirstMasks
         from tracker.in_order import InOrder
-        from tracker.output import PoseLines, result_folder
+        from tracker.output import PoseLines, PoseOutput, result_folder
         from tracker.pipeline import ObjectTracker
+        from tracker.pose_files import open_pose_files
         from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import open_source
         from tracker.viewer import NullViewer, OverlayVideo
@@ -85,19 +89,21 @@ class Track:
             texts = [sys.stdout] if self.json else []
             if folder:
                 texts.append(stack.enter_context((folder / "poses.jsonl").open("w")))
-            lines = PoseLines(texts, regions, self.smooth)
+            files = open_pose_files(self.write, folder, list(regions)) if folder else []
+            located = [object_id for object_id, concepts in regions.items() if concepts]
+            output = PoseOutput([PoseLines(texts, regions), *files], self.smooth, located)
             try:
                 for frame in frames:
                     results = tracker.step(frame if config.masks == "given" else first_masks(frame))
                     viewer.show(frame, results, {})
                     for result in results:
                         summary.add(result.object_id, result.state.value, result.timings_ms["total"])
-                        lines.add(frame.index, result)
+                    output.add(frame, results)
             except KeyboardInterrupt:
                 STDERR.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error
-            lines.finish()
+            output.finish()
         if frames.refused:
             STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
         if failure:
@@ -112,6 +118,8 @@ class Track:
 
         if self.view != "none" and self.out is None:
             raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
+        if self.write and self.out is None:
+            raise ConfigError(f"--write {' '.join(self.write)} needs a folder to write to: give --out DIR")
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})

@@ -74,7 +74,7 @@ class Folder:
             stamp_ns=stamp_ns,
             masks={} if mask is None else {self.object_id: mask},
             index=index,
-            provenance=Provenance(f"{self.name} {stem}", clock, 0, METRES_PER_UNIT),
+            provenance=Provenance(f"{self.name} {stem}", clock, 0, METRES_PER_UNIT, stem),
         )
 
     @property
