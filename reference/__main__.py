@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tracker.config import TrackerConfig
     from tracker.frame import Frame, Mask
     from tracker.saliency import SaliencyBackend
-    from tracker.sources import PosedSource
+    from tracker.sources import FrameSource
     from tracker.symmetry import Symmetry
 
 
@@ -120,7 +120,7 @@ class Reference:
 
     def _posed(
         self,
-        source: PosedSource,
+        source: FrameSource,
         backend: SaliencyBackend,
         config: TrackerConfig,
         labels: tuple[str, ...] | None,
@@ -134,7 +134,7 @@ class Reference:
 
     def _unposed(
         self,
-        source: PosedSource,
+        source: FrameSource,
         backend: SaliencyBackend,
         config: TrackerConfig,
         labels: tuple[str, ...] | None,

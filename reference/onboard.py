@@ -19,16 +19,20 @@ from tracker.errors import OnboardingError
 from tracker.frame import PosedFrame
 from tracker.geometry import Floats
 from tracker.saliency import Query, SaliencyBackend
-from tracker.sources import PosedSource, Sighting
+from tracker.sources import FrameSource, PosedSource, Sighting, require_posed
 from tracker.symmetry import Symmetry
 from tracker.view import ViewConfig, bounding_box, view_object
 
 logger = logging.getLogger(__name__)
 
 
-def read_reference_frames(source: PosedSource, object_id: str, views: int) -> list[PosedFrame]:
-    """The frames of a recording that `choose_reference_frames` picks for an object, read and with their masks."""
-    return [_posed(source, object_id, s) for s in choose_reference_frames(source.sightings(object_id), views)]
+def read_reference_frames(source: FrameSource, object_id: str, views: int) -> list[PosedFrame]:
+    """The frames of a recording that `choose_reference_frames` picks for an object, read and with their masks.
+
+    Raises SourceError where the source has no poses, or none of this object.
+    """
+    posed = require_posed(source)
+    return [_posed(posed, object_id, s) for s in choose_reference_frames(posed.sightings(object_id), views)]
 
 
 def onboard(

@@ -17,7 +17,7 @@ from tracker.errors import OnboardingError
 from tracker.frame import Frame, Mask, PosedFrame
 from tracker.geometry import Pose
 from tracker.saliency import SaliencyBackend
-from tracker.sources import PosedSource
+from tracker.sources import FrameSource, require_recording
 from tracker.symmetry import Symmetry
 
 logger = logging.getLogger(__name__)
@@ -29,9 +29,11 @@ LEAST_CONFIDENCE = 0.98
 GIVEN, CENTRED = "as given in the first reference frame", "centre of what the first reference frame shows, camera axes"
 
 
-def read_unposed_frames(source: PosedSource, object_id: str, views: int) -> list[tuple[Frame, Mask]]:
+def read_unposed_frames(source: FrameSource, object_id: str, views: int) -> list[tuple[Frame, Mask]]:
     """Of each of so many equal stretches of a recording the frame nearest to its middle that shows the object well,
-    with its mask. Poses that the source may have are not looked at. Raises OnboardingError where no frame does."""
+    with its mask. Poses that the source may have are not looked at. Raises OnboardingError where no frame does,
+    SourceError where the source has no frames by position."""
+    source = require_recording(source)
     limits = np.linspace(0, len(source), views + 1)
     chosen = []
     for first, end in zip(np.ceil(limits[:-1]), np.ceil(limits[1:]), strict=True):

@@ -162,7 +162,7 @@ def test_a_damaged_list_is_named_when_the_scene_is_opened(
 @pytest.mark.parametrize(
     ("changes", "error", "complaint"),
     [
-        ({"depth_scale": 0}, SourceError, r"000002\.png: the depth scale must be positive, got 0 metres"),
+        ({"depth_scale": 0}, SourceError, r"scene_camera\.json: image 2: the depth scale must be positive, got 0"),
         ({"depth_scale": -1}, SourceError, "the depth scale must be positive"),
         ({"depth_scale": None}, SourceError, r"scene_camera\.json: image 2: TypeError"),
         ({"cam_K": [60, 0, 23]}, SourceError, r"scene_camera\.json: image 2: ValueError"),

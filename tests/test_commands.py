@@ -411,6 +411,15 @@ def test_a_run_that_is_stopped_keeps_what_was_smoothed_too(
     assert len((tmp_path / "out" / "poses.jsonl").read_text().splitlines()) == 3
 
 
+def test_a_source_of_nobody_knows_how_many_frames_is_tracked_to_its_end(
+    model: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracker.sources, "open_source", lambda _: iter(open_scene(SCENE)))
+    said = run("tracker", SOURCE, "--model", model)
+    assert said.code == 0, said.err
+    assert "tracked" in said.err
+
+
 def test_frames_that_come_late_are_left_out_and_counted(model: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = open_scene(SCENE)
     late = [scene[index] for index in (0, 1, 1, 3, 2, 4)]

@@ -67,7 +67,8 @@ def test_a_depth_scale_that_is_no_length_is_refused(tmp_path: Path, metres_per_u
 
 def test_a_colour_picture_is_not_depth(tmp_path: Path) -> None:
     with pytest.raises(
-        SourceError, match=r"a\.png: a depth picture has one channel of 16 bits, got uint8 \(20, 30, 3\)"
+        SourceError,
+        match=r"a\.png: a depth picture has one channel of .*, got uint8 \(20, 30, 3\)",
     ):
         read_depth_m(write(tmp_path / "a.png", RGB), 0.001)
 
@@ -114,7 +115,7 @@ def test_depth_that_is_packed_into_colours_is_read_where_it_may_be(tmp_path: Pat
     packed = np.dstack((depth_mm % 256, depth_mm // 256, np.full_like(depth_mm, 9))).astype(np.uint8)
     path = write(tmp_path / "a.png", packed, colours="rgb")
     assert np.allclose(read_depth_m(path, 0.001, packed=True), depth_mm / 1000)
-    with pytest.raises(SourceError, match="one channel of 16 bits"):
+    with pytest.raises(SourceError, match="one channel of 8 or 16 bits"):
         read_depth_m(path, 0.001)
     plain = write(tmp_path / "b.png", depth_mm.astype(np.uint16))
     assert np.allclose(read_depth_m(plain, 0.001, packed=True), depth_mm / 1000)

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from reference.onboard import read_reference_frames
+from reference.unposed import read_unposed_frames
 from tracker.errors import SourceError
-from tracker.sources import SOURCES, PosedSource, open_source, require_object
+from tracker.frame import Frame
+from tracker.sources import (
+    SOURCES,
+    PosedSource,
+    length_of,
+    open_source,
+    require_object,
+    require_posed,
+    require_recording,
+)
 from tracker.sources.bop import BopScene
 from tracker.sources.folder import Folder
 from tracker.sources.synthetic import SyntheticScene
@@ -20,7 +32,7 @@ def every_source(bop_dataset: Path) -> dict[str, PosedSource]:
     scene = bop_dataset / "test" / "000003"
     (scene / "cam_K.txt").write_text("60 0 23\n0 61 17\n0 0 1\n")
     names = (f"bop:{bop_dataset}:3", f"folder:{scene}", "synthetic:still?size=160x120&frames=3")
-    return {name: open_source(name) for name in names}
+    return {name: require_posed(open_source(name)) for name in names}
 
 
 def test_every_kind_opens_as_a_posed_source_that_is_called_as_the_user_called_it(
@@ -66,7 +78,26 @@ def test_a_bop_source_needs_the_number_of_a_scene(argument: str) -> None:
 
 def test_a_path_may_have_colons(bop_dataset: Path) -> None:
     moved = bop_dataset.rename(bop_dataset.with_name("at 12:30:45"))
-    assert len(open_source(f"bop:{moved}:3")) == 3
+    assert length_of(open_source(f"bop:{moved}:3")) == 3
+
+
+class Camera:
+    """A source whose frames come once, and nobody knows how many."""
+
+    name = "camera:7"
+
+    def __iter__(self) -> Iterator[Frame]:
+        return iter(())
+
+
+def test_a_camera_has_no_length_and_whoever_needs_poses_is_told_who_has_them() -> None:
+    assert length_of(Camera()) is None
+    for ask in (require_posed, lambda camera: read_reference_frames(camera, "mug", 2)):
+        with pytest.raises(SourceError, match=r"camera:7 has no poses of objects; .*: bop, folder, synthetic"):
+            ask(Camera())
+    for ask in (require_recording, lambda camera: read_unposed_frames(camera, "mug", 2)):
+        with pytest.raises(SourceError, match="camera:7 has no frames by position, they come once"):
+            ask(Camera())
 
 
 def test_an_object_that_a_source_does_not_know_is_answered_with_those_that_it_knows(

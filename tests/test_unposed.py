@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -227,6 +227,9 @@ class Recording:
     def __init__(self, frame: Frame, shown: list[bool]) -> None:
         self._frame, self._shown = frame, shown
 
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[index] for index in range(len(self)))
+
     def __len__(self) -> int:
         return len(self._shown)
 
@@ -250,7 +253,7 @@ def test_frames_are_spread_over_the_recording_where_the_object_is_seen(
     shown: list[bool], views: int, chosen: list[int], globe: Callable[..., PosedFrame]
 ) -> None:
     frame = globe(Pose(np.eye(3), np.array([0, 0, 0.35]))).frame
-    read = read_unposed_frames(Recording(frame, shown), "thing", views)  # pyright: ignore[reportArgumentType]
+    read = read_unposed_frames(Recording(frame, shown), "thing", views)
     assert [frame.index for frame, _ in read] == chosen
     assert all(mask.sum() == 400 for _, mask in read)
 

@@ -66,7 +66,7 @@ class Track:
         from tracker.pipeline import ObjectTracker
         from tracker.pose_files import open_pose_files
         from tracker.saliency import BackendOptions, open_backend
-        from tracker.sources import open_source
+        from tracker.sources import length_of, open_source
         from tracker.viewer import NullViewer, OverlayVideo
 
         config = self._config()
@@ -85,7 +85,7 @@ class Track:
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
-            frames = InOrder(source if self.quiet or self.json else progress(source, len(source), "tracking"))
+            frames = InOrder(source if self.quiet or self.json else progress(source, length_of(source), "tracking"))
             texts = [sys.stdout] if self.json else []
             if folder:
                 texts.append(stack.enter_context((folder / "poses.jsonl").open("w")))

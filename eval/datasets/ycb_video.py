@@ -25,6 +25,7 @@ from eval.datasets.model_files import read_model
 from eval.datasets.ycb_objects import YCB_VIDEO_CLASSES, YCB_VIDEO_FRAME, is_symmetric, shape_files
 from tracker.errors import FrameError, SourceError
 from tracker.geometry import Pose
+from tracker.sources.raw_depth import metres_per_unit
 from tracker.sources.text_files import read_lines
 
 META_FIELDS = ("intrinsic_matrix", "factor_depth", "cls_indexes", "poses")
@@ -141,7 +142,7 @@ def _read_annotation(path: Path, names: Sequence[str]) -> Annotation:
         raise SourceError(f"{path}: field poses: {error}") from error
     return Annotation(
         K=meta["intrinsic_matrix"].astype(np.float64),
-        metres_per_unit=1 / float(factor[0]),
+        metres_per_unit=metres_per_unit("ycb-video", str(path), float(factor[0])),
         labels=numbers,
         poses=dict(zip(numbers, T_cam_obj, strict=True)),
     )

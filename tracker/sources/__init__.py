@@ -1,8 +1,8 @@
-"""Where frames come from: `open_source("bop:PATH:SCENE")` and the two protocols that a source may fulfil."""
+"""Where frames come from: `open_source("bop:PATH:SCENE")` and the protocols that a source may fulfil."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Sized
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -35,17 +35,43 @@ class Sighting:
 
 
 @runtime_checkable
-class PosedSource(FrameSource, Protocol):
-    """A recording with known poses: frames by position, and where each object is in them."""
+class Recording(FrameSource, Protocol):
+    """Frames by position, as often as they are asked for."""
 
     def __len__(self) -> int: ...
 
     def __getitem__(self, index: int) -> Frame: ...
 
+
+@runtime_checkable
+class PosedSource(Recording, Protocol):
+    """A recording with known poses: where each object is in its frames."""
+
     @property
     def object_ids(self) -> tuple[str, ...]: ...
 
     def sightings(self, object_id: str) -> Sequence[Sighting]: ...
+
+
+def length_of(source: FrameSource) -> int | None:
+    """How many frames the source has; None where nobody knows, as of a camera."""
+    return len(source) if isinstance(source, Sized) else None
+
+
+def require_recording(source: FrameSource) -> Recording:
+    """The source itself. Raises SourceError where its frames come once, as those of a camera."""
+    if not isinstance(source, Recording):
+        raise SourceError(f"{source.name} has no frames by position, they come once; expected a recording")
+    return source
+
+
+def require_posed(source: FrameSource) -> PosedSource:
+    """The source itself. Raises SourceError where it has no poses of objects, or no frames by position."""
+    if not isinstance(source, PosedSource):
+        raise SourceError(
+            f"{source.name} has no poses of objects; expected a recording of a kind that may: {', '.join(POSED)}"
+        )
+    return source
 
 
 def require_object(source: PosedSource, object_id: str) -> None:
@@ -54,6 +80,9 @@ def require_object(source: PosedSource, object_id: str) -> None:
         raise SourceError(
             f"{source.name} has no poses of object {object_id!r}; it has {', '.join(source.object_ids) or 'none'}"
         )
+
+
+POSED = ("bop", "folder", "synthetic")
 
 
 def _bop(argument: str) -> PosedSource:
@@ -77,11 +106,14 @@ def _synthetic(argument: str) -> PosedSource:
     return open_scene(argument)
 
 
-SOURCES: dict[str, Callable[[str], PosedSource]] = {"bop": _bop, "folder": _folder, "synthetic": _synthetic}
+SOURCES: dict[str, Callable[[str], FrameSource]] = {"bop": _bop, "folder": _folder, "synthetic": _synthetic}
 
 
-def open_source(name: str) -> PosedSource:
-    """`KIND:ARGUMENT` -> the source. Raises SourceError where kind, path or content is not what it needs."""
+def open_source(name: str) -> FrameSource:
+    """`KIND:ARGUMENT` -> the source. Raises SourceError where kind, path or content is not what it needs.
+
+    Whoever needs its frames by position asks `require_recording` for them, whoever needs poses `require_posed`.
+    """
     kind, separator, argument = name.partition(":")
     if kind not in SOURCES or not separator or not argument:
         raise SourceError(f"{name!r} is not a source; expected KIND:ARGUMENT with KIND one of {', '.join(SOURCES)}")

@@ -23,6 +23,7 @@ from tracker.frame import Frame, Mask, Provenance
 from tracker.geometry import Intrinsics, Pose
 from tracker.sources import Sighting, require_object
 from tracker.sources.image_files import read_depth_m, read_mask, read_rgb
+from tracker.sources.raw_depth import metres_per_unit
 
 NOMINAL_RATE_HZ = 30.0  # the layout has no stamps
 MASK_FOLDERS = {"visib": "mask_visib", "full": "mask"}
@@ -61,19 +62,19 @@ class BopScene:
     def __getitem__(self, index: int) -> Frame:
         image_id = self.image_ids[index]
         try:
-            unit_mm = float(self._cameras[image_id]["depth_scale"])
+            scale = float(self._cameras[image_id]["depth_scale"])
         except DAMAGE as error:
             raise SourceError(f"{self._folder}/scene_camera.json: image {image_id}: {error!r}") from error
+        unit_m = metres_per_unit("bop", f"{self._folder}/scene_camera.json: image {image_id}", scale)
         rgb = read_rgb(self._image_file("rgb", image_id))
-        depth_m = read_depth_m(self._image_file("depth", image_id), unit_mm / 1000)
         return Frame(
             rgb=rgb,
-            depth_m=depth_m,
+            depth_m=read_depth_m(self._image_file("depth", image_id), unit_m),
             intrinsics=self._intrinsics(image_id, rgb.shape[1], rgb.shape[0]),
             stamp_ns=round(image_id * 1e9 / NOMINAL_RATE_HZ),
             masks=self._masks(image_id),
             index=index,
-            provenance=self._provenance(image_id, unit_mm / 1000),
+            provenance=self._provenance(image_id, unit_m),
         )
 
     def _provenance(self, image_id: int, unit_m: float) -> Provenance:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracker.errors import SourceError
+from tracker.sources.raw_depth import raw_to_metres, require_unit
 
 PNG_END = b"IEND\xaeB`\x82"
 JPEG_END = b"\xff\xd9"
@@ -26,16 +27,14 @@ def read_depth_m(path: Path, metres_per_unit: float, *, packed: bool = False) ->
     """(H, W) float32 metres from a single-channel integer picture, 0 where there is none.
 
     packed: where the picture is of colours of 8 bits, green is the high byte and red the low one, as NOCS packs them.
-    Raises SourceError if the scale is not positive: some recordings read back 0.
+    Raises SourceError if the scale is not positive: some recordings read back 0; `raw_depth.metres_per_unit` makes it
+    of what a source states.
     """
-    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
-        raise SourceError(f"{path}: the depth scale must be positive, got {metres_per_unit:g} metres per unit")
+    require_unit(metres_per_unit, str(path))  # before a picture is decoded
     raw = _decode(path, cv2.IMREAD_UNCHANGED)
     if packed and raw.ndim == 3 and raw.dtype == np.uint8:
         raw = raw[:, :, GREEN].astype(np.uint16) * 256 + raw[:, :, RED]
-    if raw.ndim != 2 or raw.dtype not in (np.uint8, np.uint16):
-        raise SourceError(f"{path}: a depth picture has one channel of 16 bits, got {raw.dtype} {raw.shape}")
-    return raw.astype(np.float32) * np.float32(metres_per_unit)
+    return raw_to_metres(raw, metres_per_unit, str(path))
 
 
 def read_mask(path: Path) -> npt.NDArray[np.bool_]:
