@@ -23,7 +23,7 @@ class Track:
     """Track objects through frames, and say at every frame where they are, or that they are lost."""
 
     source: tyro.conf.Positional[str]
-    """bop:PATH:SCENE, folder:PATH or synthetic:NAME."""
+    """bop:PATH:SCENE, folder:PATH, rosbag:PATH or synthetic:NAME; the README has them all."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE"), tyro.conf.UseAppendAction]
     """Concept model that python -m reference made; once for every object."""
     out: Path | None = None

@@ -106,7 +106,18 @@ def _synthetic(argument: str) -> PosedSource:
     return open_scene(argument)
 
 
-SOURCES: dict[str, Callable[[str], FrameSource]] = {"bop": _bop, "folder": _folder, "synthetic": _synthetic}
+def _rosbag(argument: str) -> FrameSource:
+    from tracker.sources.rosbag import RosBag
+
+    return RosBag(argument)
+
+
+SOURCES: dict[str, Callable[[str], FrameSource]] = {
+    "bop": _bop,
+    "folder": _folder,
+    "synthetic": _synthetic,
+    "rosbag": _rosbag,
+}
 
 
 def open_source(name: str) -> FrameSource:

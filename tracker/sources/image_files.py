@@ -13,6 +13,7 @@ from tracker.sources.raw_depth import raw_to_metres, require_unit
 
 PNG_END = b"IEND\xaeB`\x82"
 JPEG_END = b"\xff\xd9"
+END_MARKERS = {".png": PNG_END, ".jpg": JPEG_END, ".jpeg": JPEG_END}
 GREEN, RED = 1, 2  # channels as OpenCV reads them
 
 
@@ -52,16 +53,26 @@ def read_labels(path: Path) -> npt.NDArray[np.integer]:
     return labels
 
 
+def decode_image(data: bytes, flag: int, where: str, end: bytes | None = None) -> npt.NDArray:
+    """A PNG or JPEG, or what else OpenCV knows, as `cv2.imdecode` gives it.
+
+    end: the marker that has to be there; if None that of what the data begin like.
+    Raises SourceError, which begins with `where`, for a picture that is not whole or cannot be decoded.
+    """
+    # OpenCV returns what it has of a truncated file and only warns, so the end marker is looked for.
+    if end is None:
+        end = PNG_END if data.startswith(b"\x89PNG") else JPEG_END if data.startswith(b"\xff\xd8") else b""
+    if end not in data.rstrip(b"\0")[-64:]:
+        raise SourceError(f"{where}: the file is truncated ({len(data)} bytes, no end marker)")
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), flag) if data else None
+    if image is None:
+        raise SourceError(f"{where}: not a picture that can be decoded ({len(data)} bytes)")
+    return image
+
+
 def _decode(path: Path, flag: int) -> npt.NDArray:
     try:
         data = path.read_bytes()
     except OSError as error:
         raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
-    # OpenCV returns what it has of a truncated file and only warns, so the end marker is looked for.
-    end = {".png": PNG_END, ".jpg": JPEG_END, ".jpeg": JPEG_END}.get(path.suffix.lower(), b"")
-    if end not in data[-64:]:
-        raise SourceError(f"{path}: the file is truncated ({len(data)} bytes, no end marker)")
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), flag) if data else None
-    if image is None:
-        raise SourceError(f"{path}: not a picture that can be decoded ({len(data)} bytes)")
-    return image
+    return decode_image(data, flag, str(path), END_MARKERS.get(path.suffix.lower(), b""))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tracker.errors import SourceError
+from tracker.sources.options import split_options
 from tracker.sources.synthetic.scenes import SCENES
 from tracker.sources.synthetic.things.objects import OBJECTS
 
@@ -70,12 +71,12 @@ OPTIONS: Mapping[str, Callable[[str], Any]] = {
 
 def read_request(argument: str) -> Request:
     """Raises SourceError that lists what there is where the scene, an option or a value is not known."""
-    scene, _, query = argument.partition("?")
+    scene = argument.partition("?")[0]
     if scene not in SCENES:
         known = ", ".join(f"{name} ({kind.summary})" for name, kind in SCENES.items())
         raise SourceError(f"synthetic:{argument}: there is no scene {scene!r}; there is {known}")
     kind = SCENES[scene]
-    given = _options(argument, query)
+    _, given = split_options("synthetic", argument, OPTIONS)
     if "object" in given and not kind.heroes:
         raise SourceError(f"synthetic:{argument}: scene {scene!r} has all objects, so option 'object' says nothing")
     width, height = given.get("size", (640, 480))
@@ -89,18 +90,3 @@ def read_request(argument: str) -> Request:
         noise=given.get("noise", 1.0),
         hero=given.get("object", kind.hero(seed)),
     )
-
-
-def _options(argument: str, query: str) -> dict[str, Any]:
-    given: dict[str, Any] = {}
-    for part in query.split("&") if query else []:
-        key, _, text = part.partition("=")
-        if key not in OPTIONS:
-            raise SourceError(f"synthetic:{argument}: there is no option {key!r}; there is {', '.join(OPTIONS)}")
-        if key in given:
-            raise SourceError(f"synthetic:{argument}: option {key!r} is given twice")
-        try:
-            given[key] = OPTIONS[key](text)
-        except ValueError as error:
-            raise SourceError(f"synthetic:{argument}: {key}={text!r}: expected {error}") from error
-    return given
