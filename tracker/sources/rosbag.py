@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from tracker.errors import MissingExtraError, SourceError
 from tracker.frame import Frame
+from tracker.sources.approximate_time import Pairing
 from tracker.sources.options import positive, split_options, text, yes_or_no
-from tracker.sources.pairing import Pairing
 from tracker.sources.ros_frames import RosFrames
 from tracker.sources.ros_images import kind_of, stamp_ns
 from tracker.sources.ros_topics import IMAGE_TYPES, INFO_TYPE, Topic, choose_topics

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.sources.pairing import MOST_WAITING, Pair, Pairing, pair_stamps, paired
+from tracker.sources.approximate_time import MOST_WAITING, Pair, Pairing, pair_stamps, paired
 
 PERIOD = 33
 stamps = st.lists(st.integers(0, 300), max_size=15, unique=True)
