@@ -67,7 +67,7 @@ def test_every_sighting_is_of_a_frame_that_has_a_mask_of_the_object(every_source
 
 @pytest.mark.parametrize("name", ["", "bop", "bop:", ":x", "webcam:0", "BOP:x:1", "/data/bop", "mug.concept"])
 def test_a_name_that_is_no_source_is_answered_with_the_kinds_that_there_are(name: str) -> None:
-    with pytest.raises(SourceError, match=f"{name!r} is not a source; .* one of bop, folder, synthetic"):
+    with pytest.raises(SourceError, match=f"{name!r} is not a source; .* one of {', '.join(SOURCES)}"):
         open_source(name)
 
 

@@ -16,6 +16,7 @@ from tracker.terminal import STDERR, progress, run
 
 if TYPE_CHECKING:
     from tracker.config import TrackerConfig
+    from tracker.sources import FrameSource
 
 
 @dataclass
@@ -23,7 +24,8 @@ class Track:
     """Track objects through frames, and say at every frame where they are, or that they are lost."""
 
     source: tyro.conf.Positional[str]
-    """bop:PATH:SCENE, folder:PATH, rosbag:PATH or synthetic:NAME; the README has them all."""
+    """bop:PATH:SCENE, folder:PATH, rosbag:PATH, synthetic:NAME, realsense, realsense:SERIAL or realsense:FILE.db3; the
+    README has them all."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE"), tyro.conf.UseAppendAction]
     """Concept model that python -m reference made; once for every object."""
     out: Path | None = None
@@ -40,7 +42,7 @@ class Track:
     masks: Literal["given", "carried"] | None = None
     """Where the object's pixels come from: given by the source in every frame, or carried on by the tracker from the
     first that is given; where none is, it looks for the object in the whole picture. Default: as the config says
-    (given)."""
+    (given); carried where the source has no masks."""
     prior: Literal["on", "off"] | None = None
     """Start each frame from the predicted pose, or search every frame anew. Default: as the config says (on)."""
     config: Path | None = None
@@ -49,8 +51,10 @@ class Track:
     """offline: every pose by all frames of the recording, also those after it; the lines are written at the end."""
     view: Literal["none", "overlay"] = "none"
     """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed."""
+    record: Path | None = None
+    """Write what the camera sees to this file (.db3) while it is tracked."""
     overwrite: bool = False
-    """Replace results that are in the --out folder."""
+    """Replace results that are in the --out folder, and the --record file."""
     json: bool = False
     """Write the lines of poses.jsonl to the standard output as they come."""
     quiet: bool = False
@@ -62,11 +66,12 @@ class Track:
         from tracker.errors import ConfigError, TrackerError
         from tracker.first_masks import FirstMasks
         from tracker.in_order import InOrder
+        from tracker.latest import Latest
         from tracker.output import PoseLines, PoseOutput, result_folder
         from tracker.pipeline import ObjectTracker
         from tracker.pose_files import open_pose_files
         from tracker.saliency import BackendOptions, open_backend
-        from tracker.sources import length_of, open_source
+        from tracker.sources import LiveSource, length_of
         from tracker.viewer import NullViewer, OverlayVideo
 
         config = self._config()
@@ -76,7 +81,8 @@ class Track:
         backend = open_backend(models[0].backend, BackendOptions(self.weights, self.device))
         tracker = ObjectTracker(models, config, backend)
         regions = {model.object_id: {c: model.locate(c, backend) for c in self.locate} for model in models}
-        source = open_source(self.source)
+        source = self._opened_source()
+        live = Latest(source) if isinstance(source, LiveSource) else None
         summary, first_masks = _Summary(), FirstMasks()
         failure: TrackerError | None = None
         with ExitStack() as stack:
@@ -85,7 +91,9 @@ class Track:
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
-            frames = InOrder(source if self.quiet or self.json else progress(source, length_of(source), "tracking"))
+            coming = stack.enter_context(live) if live else source
+            shown = coming if self.quiet or self.json else progress(coming, length_of(source), "tracking")
+            frames = InOrder(shown, live=live is not None)
             texts = [sys.stdout] if self.json else []
             if folder:
                 texts.append(stack.enter_context((folder / "poses.jsonl").open("w")))
@@ -99,6 +107,8 @@ class Track:
                     for result in results:
                         summary.add(result.object_id, result.state.value, result.timings_ms["total"])
                     output.add(frame, results)
+                    if live:
+                        summary.latencies_ms.append(live.latency_ms())
             except KeyboardInterrupt:
                 STDERR.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
@@ -106,15 +116,30 @@ class Track:
             output.finish()
         if frames.refused:
             STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
+        if live and live.dropped:
+            STDERR.print(f"{live.dropped} frames dropped: newer ones had come before they could be tracked")
         if failure:
             raise failure
         if not self.quiet and not self.json:
-            STDERR.print(summary.table())
+            STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
+
+    def _opened_source(self) -> FrameSource:
+        """Raises SourceError and OutputError, also where it cannot be recorded as it is asked for."""
+        from tracker.output import require_free
+        from tracker.sources import open_source, require_recordable
+
+        source = open_source(self.source)
+        if self.record is not None:
+            camera = require_recordable(source)
+            require_free(self.record, self.overwrite)
+            camera.record(self.record)
+        return source
 
     def _config(self) -> TrackerConfig:
         """Raises ConfigError where what is asked for does not go together."""
         from tracker.config import parse_config, read_config
         from tracker.errors import ConfigError
+        from tracker.sources import WITHOUT_MASKS, kind_of
 
         if self.view != "none" and self.out is None:
             raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
@@ -123,8 +148,9 @@ class Track:
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
-        if self.masks is not None:
-            config = parse_config({**config.model_dump(), "masks": self.masks}, f"--masks {self.masks}")
+        masks = self.masks or ("carried" if kind_of(self.source) in WITHOUT_MASKS else None)
+        if masks is not None:
+            config = parse_config({**config.model_dump(), "masks": masks}, f"--masks {masks}")
         if self.smooth != "off" and not config.prior:
             raise ConfigError(f"--smooth {self.smooth} smooths what is followed through time: it needs --prior on")
         return config
@@ -136,18 +162,23 @@ class _Summary:
 
     states: Counter[tuple[str, str]] = field(default_factory=Counter)
     times_ms: dict[str, list[float]] = field(default_factory=dict)
+    latencies_ms: list[float] = field(default_factory=list)
 
     def add(self, object_id: str, state: str, total_ms: float) -> None:
         self.states[object_id, state] += 1
         self.times_ms.setdefault(object_id, []).append(total_ms)
 
-    def table(self) -> Table:
+    def table(self, since: str) -> Table:
+        """since: what the latency is counted from."""
         import numpy as np
 
         table = Table("object", "frames", "tracking", "lost", "median ms", title="tracked")
         for object_id, times_ms in self.times_ms.items():
             tracking, lost = self.states[object_id, "tracking"], self.states[object_id, "lost"]
             table.add_row(object_id, str(len(times_ms)), str(tracking), str(lost), f"{np.median(times_ms):.1f}")
+        if self.latencies_ms:
+            median, p95 = np.percentile(self.latencies_ms, (50, 95))
+            table.caption = f"a frame's result comes {median:.0f} ms after {since} (median; 95 %: {p95:.0f} ms)"
         return table
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence, Sized
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from tracker.errors import SourceError
@@ -58,6 +59,20 @@ def length_of(source: FrameSource) -> int | None:
     return len(source) if isinstance(source, Sized) else None
 
 
+@runtime_checkable
+class LiveSource(FrameSource, Protocol):
+    """A camera: time goes on while nobody looks, and frames come once. `stop` ends them soon, from any thread."""
+
+    def stop(self) -> None: ...
+
+
+@runtime_checkable
+class Recordable(LiveSource, Protocol):
+    """A camera that can write what it sees to a file of its own kind while it is looked at."""
+
+    def record(self, path: Path) -> None: ...
+
+
 def require_recording(source: FrameSource) -> Recording:
     """The source itself. Raises SourceError where its frames come once, as those of a camera."""
     if not isinstance(source, Recording):
@@ -71,6 +86,13 @@ def require_posed(source: FrameSource) -> PosedSource:
         raise SourceError(
             f"{source.name} has no poses of objects; expected a recording of a kind that may: {', '.join(POSED)}"
         )
+    return source
+
+
+def require_recordable(source: FrameSource) -> Recordable:
+    """The source itself. Raises SourceError where it is no camera whose pictures can be written to a file."""
+    if not isinstance(source, Recordable):
+        raise SourceError(f"{source.name} cannot be recorded; expected a camera: realsense or realsense:SERIAL")
     return source
 
 
@@ -100,6 +122,12 @@ def _folder(argument: str) -> PosedSource:
     return Folder(argument)
 
 
+def _realsense(argument: str) -> FrameSource:
+    from tracker.sources.realsense import open_realsense
+
+    return open_realsense(argument)
+
+
 def _synthetic(argument: str) -> PosedSource:
     from tracker.sources.synthetic import open_scene
 
@@ -115,9 +143,17 @@ def _rosbag(argument: str) -> FrameSource:
 SOURCES: dict[str, Callable[[str], FrameSource]] = {
     "bop": _bop,
     "folder": _folder,
-    "synthetic": _synthetic,
+    "realsense": _realsense,
     "rosbag": _rosbag,
+    "synthetic": _synthetic,
 }
+WITHOUT_MASKS = ("realsense", "rosbag")  # kinds that never say where an object is
+ALONE = ("realsense",)  # kinds that may stand without an argument: the only one that there is
+
+
+def kind_of(name: str) -> str:
+    """What a source's name begins with, whether there is such a kind or not."""
+    return name.partition(":")[0].partition("?")[0]
 
 
 def open_source(name: str) -> FrameSource:
@@ -125,7 +161,9 @@ def open_source(name: str) -> FrameSource:
 
     Whoever needs its frames by position asks `require_recording` for them, whoever needs poses `require_posed`.
     """
-    kind, separator, argument = name.partition(":")
-    if kind not in SOURCES or not separator or not argument:
+    kind, (_, separator, argument) = kind_of(name), name.partition(":")
+    if not separator:  # realsense?fps=60
+        argument = name[len(kind) :]
+    if kind not in SOURCES or (not argument if separator else kind not in ALONE):
         raise SourceError(f"{name!r} is not a source; expected KIND:ARGUMENT with KIND one of {', '.join(SOURCES)}")
     return SOURCES[kind](argument)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from tracker.errors import MissingExtraError, SourceError
 from tracker.frame import Frame
 from tracker.sources.approximate_time import Pairing
-from tracker.sources.options import positive, split_options, text, yes_or_no
+from tracker.sources.query import number, read_query, some, yes_or_no
 from tracker.sources.ros_frames import RosFrames
 from tracker.sources.ros_images import kind_of, stamp_ns
 from tracker.sources.ros_topics import IMAGE_TYPES, INFO_TYPE, Topic, choose_topics
@@ -31,11 +31,11 @@ logger = logging.getLogger(__name__)
 SLOP_S = 0.02  # less than the time between two pictures at 30 Hz, more than what drivers stamp apart
 REORDER = 5  # messages of a topic that may be recorded in another order than they were stamped in
 OPTIONS = {
-    "colour": text,
-    "depth": text,
-    "info": text,
-    "depth_unit": positive("metres per unit"),
-    "slop": positive("seconds"),
+    "colour": some,
+    "depth": some,
+    "info": some,
+    "depth_unit": number(1e-6, 1.0, "metres per unit of the depth"),
+    "slop": number(0, 10, "seconds"),
     "registered": yes_or_no,
 }
 
@@ -49,7 +49,8 @@ class RosBag:
 
     def __init__(self, argument: str) -> None:
         self.name = f"rosbag:{argument}"
-        path, given = split_options("rosbag", argument, OPTIONS)
+        path, _, query = argument.partition("?")
+        given = read_query(self.name, query, OPTIONS)
         self._path = _storage(Path(path))
         self._unit_m: float | None = given.get("depth_unit")
         self._slop_ns = round(given.get("slop", SLOP_S) * 1e9)

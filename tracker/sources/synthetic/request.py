@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tracker.errors import SourceError
-from tracker.sources.options import split_options
+from tracker.sources.query import number, read_query, whole
 from tracker.sources.synthetic.scenes import SCENES
 from tracker.sources.synthetic.things.objects import OBJECTS
 
@@ -27,31 +27,12 @@ class Request:
     hero: str
 
 
-def _whole(low: int, high: int) -> Callable[[str], int]:
-    def read(text: str) -> int:
-        if not text.isdecimal() or not low <= int(text) <= high:
-            raise ValueError(f"a whole number from {low} to {high}")
-        return int(text)
-
-    return read
-
-
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.partition("x")
     try:
-        return _whole(*SIDES_PX)(width), _whole(*SIDES_PX)(height)
+        return whole(*SIDES_PX)(width), whole(*SIDES_PX)(height)
     except ValueError as error:
         raise ValueError(f"WIDTHxHEIGHT, each {error}") from error
-
-
-def _noise(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 <= value <= 5:
-        raise ValueError("a number from 0 (a clean picture) to 5; 1 is a usual camera")
-    return value
 
 
 def _object(text: str) -> str:
@@ -61,22 +42,22 @@ def _object(text: str) -> str:
 
 
 OPTIONS: Mapping[str, Callable[[str], Any]] = {
-    "frames": _whole(1, 100_000),
-    "seed": _whole(0, 2**31),
+    "frames": whole(1, 100_000),
+    "seed": whole(0, 2**31),
     "size": _size,
-    "noise": _noise,
+    "noise": number(0, 5, "0 is a clean picture, 1 a usual camera"),
     "object": _object,
 }
 
 
 def read_request(argument: str) -> Request:
     """Raises SourceError that lists what there is where the scene, an option or a value is not known."""
-    scene = argument.partition("?")[0]
+    scene, _, query = argument.partition("?")
     if scene not in SCENES:
         known = ", ".join(f"{name} ({kind.summary})" for name, kind in SCENES.items())
         raise SourceError(f"synthetic:{argument}: there is no scene {scene!r}; there is {known}")
     kind = SCENES[scene]
-    _, given = split_options("synthetic", argument, OPTIONS)
+    given = read_query(f"synthetic:{argument}", query, OPTIONS)
     if "object" in given and not kind.heroes:
         raise SourceError(f"synthetic:{argument}: scene {scene!r} has all objects, so option 'object' says nothing")
     width, height = given.get("size", (640, 480))
