@@ -134,6 +134,18 @@ def _synthetic(argument: str) -> PosedSource:
     return open_scene(argument)
 
 
+def _tum(argument: str) -> Recording:
+    from tracker.sources.tum import TumFolder
+
+    return TumFolder(argument)
+
+
+def _video(argument: str) -> FrameSource:
+    from tracker.sources.video import VideoWithDepth
+
+    return VideoWithDepth(argument)
+
+
 def _rosbag(argument: str) -> FrameSource:
     from tracker.sources.rosbag import RosBag
 
@@ -146,8 +158,10 @@ SOURCES: dict[str, Callable[[str], FrameSource]] = {
     "realsense": _realsense,
     "rosbag": _rosbag,
     "synthetic": _synthetic,
+    "tum": _tum,
+    "video": _video,
 }
-WITHOUT_MASKS = ("realsense", "rosbag")  # kinds that never say where an object is
+WITHOUT_MASKS = ("realsense", "rosbag", "tum", "video")  # kinds that never say where an object is
 ALONE = ("realsense",)  # kinds that may stand without an argument: the only one that there is
 
 
