@@ -1,4 +1,4 @@
-"""Recordings in TUM's layout: what belongs together, in metres, with a camera that somebody told; never a guessed one."""
+"""Recordings in TUM's layout: what belongs together, in metres, with a camera that somebody told, never a guess."""
 
 from __future__ import annotations
 

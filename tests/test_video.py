@@ -55,9 +55,7 @@ def test_the_camera_may_be_in_a_file_beside_the_video_and_the_unit_may_be_given(
 @pytest.mark.parametrize(("frames", "depths"), [(5, 4), (4, 5)])
 def test_counts_that_differ_are_refused(tmp_path: Path, frames: int, depths: int) -> None:
     argument = write(tmp_path, frames, depths)
-    with pytest.raises(
-        SourceError, match=rf"rgb\.mp4 has {frames} frames and .*depth {depths} depth pictures"
-    ):
+    with pytest.raises(SourceError, match=rf"rgb\.mp4 has {frames} frames and .*depth {depths} depth pictures"):
         VideoWithDepth(f"{argument}{K}")
 
 

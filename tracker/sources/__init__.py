@@ -134,6 +134,12 @@ def _synthetic(argument: str) -> PosedSource:
     return open_scene(argument)
 
 
+def _orbbec(argument: str) -> FrameSource:
+    from tracker.sources.orbbec import open_orbbec
+
+    return open_orbbec(argument)
+
+
 def _tum(argument: str) -> Recording:
     from tracker.sources.tum import TumFolder
 
@@ -155,14 +161,15 @@ def _rosbag(argument: str) -> FrameSource:
 SOURCES: dict[str, Callable[[str], FrameSource]] = {
     "bop": _bop,
     "folder": _folder,
+    "orbbec": _orbbec,
     "realsense": _realsense,
     "rosbag": _rosbag,
     "synthetic": _synthetic,
     "tum": _tum,
     "video": _video,
 }
-WITHOUT_MASKS = ("realsense", "rosbag", "tum", "video")  # kinds that never say where an object is
-ALONE = ("realsense",)  # kinds that may stand without an argument: the only one that there is
+WITHOUT_MASKS = ("orbbec", "realsense", "rosbag", "tum", "video")  # kinds that never say where an object is
+ALONE = ("orbbec", "realsense")  # kinds that may stand without an argument: the only one that there is
 
 
 def kind_of(name: str) -> str:
