@@ -86,12 +86,33 @@ class SoftwareFrames:
 Shown = SoftwareFrames | Exception | Callable[[], None] | None
 
 
+class SoftwareContext:
+    """The SDK's class, of which there is one instance for all."""
+
+    def __init__(self, serials: Sequence[str], log: list[str]) -> None:
+        self._serials, self._log = serials, log
+
+    def __call__(self) -> SoftwareContext:
+        return self
+
+    def set_logger_level(self, level: str) -> None:
+        self._log.append(f"log {level}")
+
+    def query_devices(self) -> Any:
+        return SimpleNamespace(
+            get_count=lambda: len(self._serials),
+            get_device_serial_number_by_index=lambda k: self._serials[k],
+            get_device_by_index=lambda k: self._serials[k],
+        )
+
+
 class SoftwareSDK:
     """A camera of every serial number, and files, all of which show the same. `log` has what was called."""
 
     OBSensorType = SimpleNamespace(COLOR_SENSOR="colour", DEPTH_SENSOR="depth")
     OBStreamType = SimpleNamespace(COLOR_STREAM="colour")
     OBFrameAggregateOutputMode = SimpleNamespace(FULL_FRAME_REQUIRE="full")
+    OBLogLevel = SimpleNamespace(NONE="none")
     OBPlaybackStatus = SimpleNamespace(PLAYING="playing", STOPPED="stopped")
 
     class OBError(Exception):
@@ -100,15 +121,7 @@ class SoftwareSDK:
     def __init__(self, *shown: Shown, serials: Sequence[str] = ("CP1",), broken: bool = False) -> None:
         self._shown, self._serials, self._broken = shown, serials, broken
         self.log: list[str] = []
-
-    def Context(self) -> Any:  # noqa: N802 - the SDK's name
-        return SimpleNamespace(
-            query_devices=lambda: SimpleNamespace(
-                get_count=lambda: len(self._serials),
-                get_device_serial_number_by_index=lambda k: self._serials[k],
-                get_device_by_index=lambda k: self._serials[k],
-            )
-        )
+        self.Context = SoftwareContext(serials, self.log)
 
     def PlaybackDevice(self, path: str) -> Any:  # noqa: N802 - the SDK's name
         if self._broken:

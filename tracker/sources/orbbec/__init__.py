@@ -40,8 +40,11 @@ def open_orbbec(argument: str) -> OrbbecCamera | OrbbecRecording:
 def _sdk() -> Any:
     try:
         # Not an extra: its metadata ask for numpy below 2 and one release of open3d, neither of which it needs.
-        return importlib.import_module("pyorbbecsdk")
+        sdk = importlib.import_module("pyorbbecsdk")
     except ImportError as error:
         raise MissingExtraError(
             f"orbbec: needs the package pyorbbecsdk2 ({error}); install it with pip install --no-deps pyorbbecsdk2"
         ) from error
+    # It makes a folder Log where it runs otherwise, and a file of another kind never returns (2.1.2).
+    sdk.Context.set_logger_level(sdk.OBLogLevel.NONE)
+    return sdk

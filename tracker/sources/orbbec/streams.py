@@ -53,6 +53,7 @@ class OrbbecRecording:
     def __init__(self, sdk: Any, path: Path, name: str, depth_unit_m: float | None = None) -> None:
         self.name = name
         self._sdk, self._path, self._unit_m = sdk, path, depth_unit_m
+        self._context = sdk.Context()  # the SDK's own, for as long as something of it is open
         self._opened()  # that it is none is told at once
 
     def __iter__(self) -> Iterator[Frame]:
