@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from tracker.frame import Frame
 
@@ -16,6 +16,7 @@ class LiveCamera:
     were asked for."""
 
     name = "camera:7"
+    left_out: Mapping[str, int] = {}
 
     def __init__(self) -> None:
         self._coming: queue.Queue[Frame | BaseException | None] = queue.Queue()

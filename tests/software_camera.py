@@ -45,7 +45,9 @@ class SoftwareCamera:
         pinhole = (rs.distortion.brown_conrady, (0.0,) * 5)
         streams = {
             "depth": _stream(rs.stream.depth, rs.format.z16, 2, depth or colour, pinhole if depth else distortion),
-            "colour": _stream(rs.stream.color, colour_format, 3, colour, distortion),
+            "colour": _stream(
+                rs.stream.color, colour_format, 2 if colour_format == rs.format.yuyv else 3, colour, distortion
+            ),
         }
         self._profiles = {kind: self._sensors[kind].add_video_stream(stream) for kind, stream in streams.items()}
         self._sensors["depth"].add_read_only_option(rs.option.depth_units, unit_m)

@@ -30,6 +30,7 @@ from tracker.pipeline import ObjectTracker
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources import open_source
+from tracker.sources.synthetic import SyntheticScene
 from tracker.sources.synthetic.faults import without_depth
 
 Run = Callable[..., tuple[int, str]]
@@ -161,6 +162,12 @@ def test_what_is_no_camera_is_not_recorded(source: str, run: Run, tmp_path: Path
     assert list(tmp_path.iterdir()) == []
 
 
+def test_without_masks_there_has_to_be_a_prior(run: Run) -> None:
+    code, said = run("realsense", "--prior", "off")
+    assert code == 1
+    assert "realsense has no masks, so the tracker carries them on: it needs --prior on" in said
+
+
 # Faults
 
 
@@ -194,6 +201,21 @@ def test_repeated_stamps_and_a_clock_that_begins_anew_cost_frames_and_not_the_ob
     assert set(states(results)) == {"tracking"}
     assert len(results) == 4 + len(anew) - 4
     assert "the clock went back; from here on its stamps count" in caplog.text
+
+
+def test_after_a_long_gap_the_object_is_where_it_is_now_or_lost(
+    track: Callable[[Sequence[Frame]], list[TrackResult]], can_scene: SyntheticScene, can_frames: list[Frame]
+) -> None:
+    """What an unplugged camera looks like from behind: ten seconds without a frame, and the can is elsewhere."""
+    later = [can_scene[index] for index in range(50, 58)]
+    results = track([*can_frames[:4], *(replace(f, stamp_ns=f.stamp_ns + 10**10) for f in later)])
+    told = list(states(results))
+    assert told[:4] == ["tracking"] * 4
+    assert told[-1] == "tracking"
+    truth = {s.index: s.T_cam_obj for s in can_scene.sightings("soup_can")}
+    for frame, result in zip(later, results[4:], strict=True):
+        if result.pose:
+            assert result.pose.distance_to_m(truth[frame.index]) < 0.02
 
 
 def test_without_depth_the_object_is_lost_with_a_reason_and_found_again(

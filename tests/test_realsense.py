@@ -11,19 +11,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
+from reference.onboard import onboard, read_reference_frames
 from tests.software_camera import SoftwareCamera, rs
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import FrameError, MissingExtraError, SourceError
+from tracker.first_masks import FirstMasks
 from tracker.frame import Frame
 from tracker.geometry import Intrinsics
 from tracker.pipeline import ObjectTracker
 from tracker.result import TrackState
 from tracker.saliency import SaliencyBackend
 from tracker.sources import LiveSource, length_of, open_source, require_recordable
+from tracker.sources.bop import BopScene
 from tracker.sources.lens import MODELS, Lens
 from tracker.sources.realsense import RealSenseCamera, RealSenseFile, open_realsense
 from tracker.sources.realsense.camera import Patience
@@ -32,7 +36,7 @@ from tracker.sources.realsense.request import Options, read_request
 
 CAMERA = Intrinsics(150.0, 151.0, 80.5, 59.0, 160, 120)
 LONG_S = 20.0
-QUICK = Patience(stall_s=0.3, wait_s=0.02)
+QUICK, CALM = Patience(stall_s=0.8, wait_s=0.02), Patience(stall_s=LONG_S)
 
 
 class Watching:
@@ -74,8 +78,9 @@ def watch() -> Iterator[Callable[..., Watching]]:
     started: list[Watching] = []
 
     def start(camera: SoftwareCamera | Callable[[], Any], record: Path | None = None, **options: Any) -> Watching:
+        one = isinstance(camera, SoftwareCamera)
         find = (lambda: camera.device) if isinstance(camera, SoftwareCamera) else camera
-        source = RealSenseCamera(rs, find, Options(**options), "realsense:soft-1", QUICK)
+        source = RealSenseCamera(rs, find, Options(**options), "realsense:soft-1", CALM if one else QUICK)
         if record is not None:
             source.record(record)
         started.append(Watching(source))
@@ -227,7 +232,7 @@ def test_first_pictures_without_colour_are_skipped_and_counted(watch: Callable[.
         time.sleep(0.02)
     show(camera, watching, 2)
     assert [frame.rgb[0, 0, 0] for frame in watching.end()] == [3, 4]
-    assert watching.source.skipped == 3
+    assert [count for what, count in watching.source.left_out.items() if "at the start" in what] == [3]
 
 
 def test_colour_without_depth_is_a_frame_without_depth_and_is_told(
@@ -272,7 +277,7 @@ def test_a_camera_that_is_lost_and_comes_back_goes_on(
     assert [frame.index for frame in frames] == list(range(6))
     assert [frame.rgb[0, 0, 0] for frame in frames] == [0, 1, 2] * 2
     told = [record.message for record in caplog.records]
-    assert "realsense:soft-1 is lost (no pictures for 0.3 s); it is looked for again" in told
+    assert "realsense:soft-1 is lost (no pictures for 0.8 s); it is looked for again" in told
     assert any(message.startswith("realsense:soft-1 is back after") for message in told)
 
 
@@ -496,3 +501,38 @@ def test_a_recorded_scene_is_tracked_as_the_scene_itself(
         assert played is not None
         assert direct.distance_to_m(played) < 0.001
         assert np.degrees(direct.angle_to_rad(played)) < 0.3
+
+
+def test_colours_of_half_the_resolution_are_rgb_too(watch: Callable[..., Watching]) -> None:
+    camera = SoftwareCamera(CAMERA, colour_format=rs.format.yuyv)
+    watching = watch(camera)
+    yuyv = cv2.cvtColor(np.full((120, 160, 3), (200, 90, 30), np.uint8), cv2.COLOR_RGB2YUV_YUYV)
+    camera.show(np.asarray(yuyv, np.uint8), plane())
+    assert np.abs(watching.until(1)[0].rgb.astype(int) - [200, 90, 30]).max() <= 3
+
+
+@pytest.mark.shared_data
+def test_a_real_recording_that_goes_through_a_camera_and_its_file_is_tracked_to_the_same_poses(
+    shared_data: Path, attributes: SaliencyBackend, watch: Callable[..., Watching], tmp_path: Path
+) -> None:
+    scene = BopScene(shared_data / "rbt", 1)
+    models = [onboard(read_reference_frames(scene, object_id, 2), attributes) for object_id in scene.object_ids]
+    given = [scene[index] for index in range(15)]
+    camera = SoftwareCamera(given[0].intrinsics, unit_m=0.001)
+    watching = watch(camera, record=tmp_path / "rbt.db3")
+    for k, frame in enumerate(given):
+        camera.show_frame(frame)
+        watching.until(k + 1)
+    watching.end()
+    played = list(open_source(f"realsense:{tmp_path / 'rbt.db3'}"))
+    assert len(played) == len(given)
+    trackers = [ObjectTracker(models, TrackerConfig(masks="carried"), attributes) for _ in range(2)]
+    first = [FirstMasks(), FirstMasks()]
+    for before, after in zip(given, played, strict=True):
+        results = [trackers[0].step(first[0](before)), trackers[1].step(first[1](replace(after, masks=before.masks)))]
+        for direct, of_camera in zip(*results, strict=True):
+            assert direct.state is of_camera.state is TrackState.TRACKING
+            assert direct.pose is not None
+            assert of_camera.pose is not None
+            assert direct.pose.distance_to_m(of_camera.pose) < 0.001
+            assert np.degrees(direct.pose.angle_to_rad(of_camera.pose)) < 0.1

@@ -116,8 +116,9 @@ class Track:
             output.finish()
         if frames.refused:
             STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
-        if live and live.dropped:
-            STDERR.print(f"{live.dropped} frames dropped: newer ones had come before they could be tracked")
+        for what, count in live.left_out.items() if live else ():
+            if count:
+                STDERR.print(f"{count} frames {what}")
         if failure:
             raise failure
         if not self.quiet and not self.json:
@@ -148,7 +149,11 @@ class Track:
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
-        masks = self.masks or ("carried" if kind_of(self.source) in WITHOUT_MASKS else None)
+        masks = self.masks
+        if masks is None and kind_of(self.source) in WITHOUT_MASKS:
+            if not config.prior:
+                raise ConfigError(f"{self.source} has no masks, so the tracker carries them on: it needs --prior on")
+            masks = "carried"
         if masks is not None:
             config = parse_config({**config.model_dump(), "masks": masks}, f"--masks {masks}")
         if self.smooth != "off" and not config.prior:

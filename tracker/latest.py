@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import TracebackType
 
 from tracker.frame import Frame
@@ -37,6 +37,11 @@ class Latest:
     def dropped(self) -> int:
         """Frames that nobody took."""
         return self._door.dropped
+
+    @property
+    def left_out(self) -> Mapping[str, int]:
+        """Frames of the camera that were not tracked, by what became of them."""
+        return {**self._source.left_out, "dropped: newer ones had come before they could be tracked": self.dropped}
 
     def __enter__(self) -> Latest:
         self._thread.start()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence, Sized
+from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -61,9 +61,15 @@ def length_of(source: FrameSource) -> int | None:
 
 @runtime_checkable
 class LiveSource(FrameSource, Protocol):
-    """A camera: time goes on while nobody looks, and frames come once. `stop` ends them soon, from any thread."""
+    """A camera: time goes on while nobody looks, and frames come once.
+
+    `stop` ends them soon, from any thread. left_out: how many frames never came out, by what became of them.
+    """
 
     def stop(self) -> None: ...
+
+    @property
+    def left_out(self) -> Mapping[str, int]: ...
 
 
 @runtime_checkable

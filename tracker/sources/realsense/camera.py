@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,7 +39,7 @@ class RealSenseCamera:
     """Frames as they come, until `stop`, or until the camera is gone for longer than options.reconnect_s.
 
     find: answers the device, anew after each loss; it raises SourceError where there is none. What comes while nobody
-    looks is dropped and counted in `dropped`. Stamps are the camera's own and may begin anew after a loss.
+    looks is dropped and counted. Stamps are the camera's own and may begin anew after a loss.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class RealSenseCamera:
         self._tolerance = Tolerance(name)
         self._record: Path | None = None
         self._index, self._recordings = 0, 0
-        self.dropped, self.skipped = 0, 0
+        self._dropped, self._skipped = 0, 0
 
     def record(self, path: Path) -> None:
         """From the next opening on, write all that comes to the file, in place of what is there; after a loss, to one
@@ -75,9 +75,13 @@ class RealSenseCamera:
         self._stopped.set()
 
     @property
-    def refused(self) -> int:
-        """Frames that could not be right and were left out."""
-        return self._tolerance.refused
+    def left_out(self) -> Mapping[str, int]:
+        """Frames that never came out, by what became of them."""
+        return {
+            "skipped at the start: depth without colour, or colour without depth": self._skipped,
+            "dropped: newer ones had come before they could be read": self._dropped // 2,  # two pictures a frame
+            "left out: they could not be right": self._tolerance.refused,
+        }
 
     def __iter__(self) -> Iterator[Frame]:
         """Raises SourceError where the camera cannot be opened, is gone for too long, or shows nothing usable."""
@@ -129,7 +133,7 @@ class RealSenseCamera:
             if streams is not None:
                 streams.stop()
             device = None  # a recording is whole when its device is gone
-            self.dropped += door.dropped
+            self._dropped += door.dropped
 
     def _opened_device(self) -> Any:
         device = self._find()
@@ -143,7 +147,7 @@ class RealSenseCamera:
     def _pairs(self, door: Handover[Any], pairing: Pairing) -> Iterator[Pair]:
         """Until it is stopped or nothing has come for too long."""
         depth, heard_at, blind = self._sdk.stream.depth, time.monotonic(), False
-        skipped_before = self.skipped
+        skipped_before = self._skipped
         while not self._stopped.is_set() and time.monotonic() - heard_at < self._patience.stall_s:
             shot = door.get(min(POLL_S, self._patience.stall_s))
             if shot is None:
@@ -154,8 +158,8 @@ class RealSenseCamera:
                 if (pair.depth is None) != blind:
                     blind = pair.depth is None
                     logger.warning("%s: colour comes %s depth", self.name, "without" if blind else "again with")
-                if self.skipped < skipped_before + pairing.skipped:
-                    self.skipped = skipped_before + pairing.skipped
+                if self._skipped < skipped_before + pairing.skipped:
+                    self._skipped = skipped_before + pairing.skipped
                     logger.info("%s: %d first pictures without the other's are skipped", self.name, pairing.skipped)
                 yield pair
                 heard_at = time.monotonic()  # however long the taker had it

@@ -68,11 +68,18 @@ class RealSenseFile:
         door: Handover[Any] = Handover(IN_FLIGHT, newest=False)
         ended, stopped = threading.Event(), self._sdk.playback_status.stopped
         playback.set_status_changed_callback(lambda status: ended.set() if status == stopped else None)
-        playback.pause()  # or one stream runs off before the other has started
-        streams.start(door.put)
-        playback.resume()
+        begun = (
+            threading.Event()
+        )  # until then the file waits with the first picture: no stream runs off before the other
+
+        def take(frame: Any) -> None:
+            begun.wait()
+            door.put(frame)
+
         read, silent_s = 0, 0.0
         try:
+            streams.start(take)
+            begun.set()
             while silent_s < SILENCE_S:
                 over = ended.is_set()  # asked before: what has come until then is still taken
                 frame = door.get(POLL_S)
@@ -84,7 +91,10 @@ class RealSenseFile:
                 else:
                     silent_s += POLL_S
             raise SourceError(f"{self._path}: the recording is damaged: nothing comes after {read} pictures")
+        except RuntimeError as error:
+            raise SourceError(f"{self._path}: the recording cannot be played back ({error})") from error
         finally:
+            begun.set()
             door.end()  # the SDK's threads may wait before it
             streams.stop()
 
