@@ -33,7 +33,7 @@ ORDER = {
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "camera_motion", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
         "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "track", "pipeline",
-        "bop_rows", "pose_files", "output", "viewer", "terminal", "__main__",
+        "bop_rows", "pose_files", "ros_results", "output", "viewer", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",

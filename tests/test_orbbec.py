@@ -161,6 +161,7 @@ def test_a_camera_s_frame_that_cannot_be_right_is_left_out() -> None:
     with pytest.raises(SourceError, match="orbbec: no pictures for 5 s"):
         seen.extend(camera)
     assert numbers(seen) == [(1, 1), (3, 3)]
+    assert dict(camera.left_out) == {"left out: they could not be right": 1}
     assert [frame.index for frame in seen] == [0, 2]
 
 

@@ -70,8 +70,9 @@ class Track:
         from tracker.output import PoseLines, PoseOutput, result_folder
         from tracker.pipeline import ObjectTracker
         from tracker.pose_files import open_pose_files
+        from tracker.ros_results import PosePublisher
         from tracker.saliency import BackendOptions, open_backend
-        from tracker.sources import LiveSource, length_of
+        from tracker.sources import LiveSource, RosSource, length_of
         from tracker.viewer import NullViewer, OverlayVideo
 
         config = self._config()
@@ -99,21 +100,26 @@ class Track:
                 texts.append(stack.enter_context((folder / "poses.jsonl").open("w")))
             files = open_pose_files(self.write, folder, list(regions)) if folder else []
             located = [object_id for object_id, concepts in regions.items() if concepts]
-            output = PoseOutput([PoseLines(texts, regions), *files], self.smooth, located)
+            outputs = [PoseOutput([PoseLines(texts, regions), *files], self.smooth, located)]
+            if isinstance(source, RosSource):
+                publisher = PosePublisher(source.ros, source.node, models, lambda: source.frame_id)
+                outputs.append(PoseOutput([publisher]))
             try:
                 for frame in frames:
                     results = tracker.step(frame if config.masks == "given" else first_masks(frame))
                     viewer.show(frame, results, {})
                     for result in results:
                         summary.add(result.object_id, result.state.value, result.timings_ms["total"])
-                    output.add(frame, results)
+                    for output in outputs:
+                        output.add(frame, results)
                     if live:
                         summary.latencies_ms.append(live.latency_ms())
             except KeyboardInterrupt:
                 STDERR.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error
-            output.finish()
+            for output in outputs:
+                output.finish()
         if frames.refused:
             STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
         for what, count in live.left_out.items() if live else ():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +26,23 @@ class OrbbecCamera:
         self._sdk, self._unit_m = sdk, depth_unit_m
         self._device = _asked(sdk, name, lambda: _find_device(sdk, serial, name))
         self._stopped = threading.Event()
+        self._tolerance = Tolerance(name)
 
     def stop(self) -> None:
         """Ends the frames soon, from any thread."""
         self._stopped.set()
 
+    @property
+    def left_out(self) -> Mapping[str, int]:
+        """How many frames never came out, by what became of them."""
+        return {"left out: they could not be right": self._tolerance.refused}
+
     def __iter__(self) -> Iterator[Frame]:
         """Raises SourceError where the camera cannot be opened or shows nothing usable."""
-        convert, tolerance, index = Converter(self.name, self._unit_m), Tolerance(self.name), 0
+        convert, index = Converter(self.name, self._unit_m), 0
         for frames in _shown(self._sdk, self._device, self.name, self._stopped.is_set):
             for pair in frames:
-                frame = tolerance.made(lambda pair=pair, index=index: convert(pair, index))
+                frame = self._tolerance.made(lambda pair=pair, index=index: convert(pair, index))
                 index += 1
                 if frame is not None:
                     yield frame
