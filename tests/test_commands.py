@@ -298,7 +298,7 @@ def test_an_empty_folder_holds_no_results(model: Path, run: Run, tmp_path: Path)
     ("source", "options", "words"),
     [
         ("synthetic:kitchen", (), ("'kitchen'", "tabletop")),
-        ("webcam:0", (), ("webcam:0", "bop, folder, ")),
+        ("webcam:0", (), ("webcam:0", "one of bop, folder, ")),
         ("bop:/nowhere:1", (), ("/nowhere",)),
         (SOURCE, ("--config", "unknown.yaml"), ("'colour'", "prior", "verification", "filter")),
         (SOURCE, ("--config", "deep.yaml"), ("'filter.speed'", "acceleration_mps2", "gate")),

@@ -292,7 +292,7 @@ def test_a_camera_that_does_not_come_back_ends_with_an_error_after_what_was_seen
             return device
         raise SourceError("there is no camera 'soft-1'")
 
-    watching = watch(find, reconnect_s=0.5)
+    watching = watch(find, reconnect_s=1.5)
     camera.wait_until_open()
     show(camera, watching, 2)
     assert len(watching.wait()) == 2

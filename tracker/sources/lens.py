@@ -52,7 +52,7 @@ MODELS: Mapping[str, tuple[tuple[int, ...], Callable[[Intrinsics, Floats], Maps]
     "equidistant": ((4,), _fisheye),
     "fisheye": ((4,), _fisheye),
 }
-PINHOLE_AT_ZERO = {name for name, (_, maps) in MODELS.items() if maps is not _fisheye}
+PINHOLE_AT_ZERO = {"none", *(name for name, (_, maps) in MODELS.items() if maps is not _fisheye)}
 
 
 class Lens:
@@ -71,7 +71,7 @@ class Lens:
         values = np.asarray(coefficients, float).ravel()
         if not np.isfinite(values).all():
             raise SourceError(f"{where}: the distortion coefficients are not finite: {values.tolist()}")
-        if not values.any() and (model in PINHOLE_AT_ZERO or model == "none"):
+        if not values.any() and model in PINHOLE_AT_ZERO:
             return
         if model not in MODELS:
             raise SourceError(

@@ -9,7 +9,7 @@ import numpy as np
 from tracker.errors import FrameError, SourceError
 from tracker.frame import Frame, Provenance
 from tracker.geometry import Intrinsics
-from tracker.sources.lens import Lens
+from tracker.sources.lens import PINHOLE_AT_ZERO, Lens
 from tracker.sources.pairing import Pair, Shot
 from tracker.sources.raw_depth import metres_per_unit
 from tracker.sources.raw_frame import raw_to_frame
@@ -99,8 +99,8 @@ def _are_registered(depth: Profile, colour: Profile, name: str) -> bool:
     one, other = depth.get_intrinsics(), colour.get_intrinsics()
     keys = ("width", "height", "fx", "fy", "ppx", "ppy")
     same_camera = all(getattr(one, key) == getattr(other, key) for key in keys)
-    undistorted = not any(one.coeffs) and not any(other.coeffs)
-    same_lens = undistorted or (one.model == other.model and list(one.coeffs) == list(other.coeffs))
+    straight = all(not any(lens.coeffs) and lens.model.name in PINHOLE_AT_ZERO for lens in (one, other))
+    same_lens = straight or (one.model == other.model and list(one.coeffs) == list(other.coeffs))
     try:
         between = depth.get_extrinsics_to(colour)
     except RuntimeError as error:
