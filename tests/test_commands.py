@@ -243,6 +243,26 @@ def test_tracker_writes_lines_settings_and_a_video(model: Path, run: Run, tmp_pa
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+def test_tracker_writes_the_formats_of_the_field_with_the_same_smoothed_poses(
+    model: Path, run: Run, tmp_path: Path
+) -> None:
+    line = ("tracker", SOURCE, "--model", model, "--smooth", "offline", "--out", tmp_path / "out")
+    said = run(*line, "--write", "ob-in-cam", "tum")
+    assert (said.code, said.out) == (0, ""), said.err
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"poses.jsonl", "config.yaml", "ob_in_cam", "tum"}
+    lines = [json.loads(each) for each in (tmp_path / "out" / "poses.jsonl").read_text().splitlines()]
+    matrices = [np.loadtxt(path) for path in sorted((tmp_path / "out" / "ob_in_cam").iterdir())]
+    rows = np.loadtxt(tmp_path / "out" / "tum" / f"{BOX}.txt")
+    for each, matrix, row in zip(lines, matrices, rows, strict=True):
+        assert matrix[:3, 3].tolist() == each["T_cam_obj"]["translation_m"] == row[1:4].tolist()
+        assert row[[7, 4, 5, 6]].tolist() == each["T_cam_obj"]["quaternion_wxyz"]
+        assert row[0] == pytest.approx(each["stamp_ns"] / 1e9)
+    refused = run("tracker", SOURCE, "--model", model, "--write", "bop", "--out", tmp_path / "bop")
+    assert_refused(refused, "BOP's rows have numbers", BOX)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert_refused(run("tracker", SOURCE, "--model", model, "--write", "tum"), "--write tum", "--out")
+
+
 def test_tracker_needs_no_folder_and_can_be_quiet(
     model: Path, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

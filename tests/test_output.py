@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from collections.abc import Sequence
+from dataclasses import fields, replace
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from tracker.confidence import Grounds
 from tracker.errors import OutputError, SourceError
-from tracker.geometry import Pose
-from tracker.output import PoseLines, as_json_line, require_free, result_folder
-from tracker.result import TrackResult, TrackState
+from tracker.frame import Frame, Provenance
+from tracker.geometry import Intrinsics, Pose
+from tracker.output import PoseLines, PoseOutput, as_json_line, require_free, result_folder
+from tracker.result import Surface, TrackResult, TrackState
 from tracker.verification import Evidence
 
 
@@ -149,23 +151,65 @@ def lines_of(text: StringIO) -> list[dict[str, Any]]:
     return [json.loads(line) for line in text.getvalue().splitlines()]
 
 
-def test_lines_go_to_every_text_as_they_come() -> None:
+def test_lines_go_to_every_text() -> None:
     texts = [StringIO(), StringIO()]
     lines = PoseLines(texts, {"mug": {}})
-    lines.add(4, TRACKED)
-    assert [line["frame"] for line in lines_of(texts[0])] == [4]
-    lines.add(5, LOST)
-    lines.finish()
+    lines.add(4, Provenance(), [TRACKED])
+    lines.add(5, Provenance(), [LOST])
     assert lines_of(texts[0]) == lines_of(texts[1])
     assert [(line["frame"], line["state"]) for line in lines_of(texts[0])] == [(4, "tracking"), (5, "lost")]
 
 
-def test_smoothed_lines_come_at_the_end_and_once() -> None:
-    text = StringIO()
-    lines = PoseLines([text], {"mug": {}}, smooth="offline")
-    for frame_index, result in ((4, TRACKED), (5, LOST)):
-        lines.add(frame_index, result)
-    assert text.getvalue() == ""
-    lines.finish()
-    lines.finish()
-    assert [(line["frame"], line["state"]) for line in lines_of(text)] == [(4, "tracking"), (5, "lost")]
+class Taken:
+    """A writer that remembers what it was given."""
+
+    def __init__(self) -> None:
+        self.frames: list[tuple[int, str, list[TrackResult]]] = []
+
+    def add(self, frame_index: int, provenance: Provenance, results: Sequence[TrackResult]) -> None:
+        self.frames.append((frame_index, provenance.name, list(results)))
+
+
+def frame(index: int) -> Frame:
+    camera = Intrinsics(60.0, 60.0, 23.5, 17.5, 48, 36)
+    rgb, depth_m = np.zeros((36, 48, 3), np.uint8), np.zeros((36, 48), np.float32)
+    return Frame(rgb, depth_m, camera, index, index=index, provenance=Provenance(name=f"picture{index}"))
+
+
+def test_results_go_to_every_writer_as_they_come() -> None:
+    writers = [Taken(), Taken()]
+    output = PoseOutput(writers)
+    output.add(frame(4), [TRACKED])
+    assert writers[0].frames == [(4, "picture4", [TRACKED])]
+    output.add(frame(5), [LOST])
+    output.finish()
+    assert writers[0].frames == writers[1].frames == [(4, "picture4", [TRACKED]), (5, "picture5", [LOST])]
+
+
+def test_smoothed_results_come_at_the_end_once_and_the_same_to_every_writer() -> None:
+    cup = replace(TRACKED, object_id="cup")
+    writers = [Taken(), Taken()]
+    output = PoseOutput(writers, smooth="offline")
+    for index, results in ((4, [TRACKED, cup]), (5, [LOST, cup])):
+        output.add(frame(index), results)
+    assert writers[0].frames == []
+    output.finish()
+    output.finish()
+    told = [
+        [(index, name, [(r.object_id, r.state) for r in results]) for index, name, results in writer.frames]
+        for writer in writers
+    ]
+    mug, tracking = ("mug", TrackState.TRACKING), TrackState.TRACKING
+    lost = ("mug", TrackState.LOST)
+    assert told[0] == [(4, "picture4", [mug, ("cup", tracking)]), (5, "picture5", [lost, ("cup", tracking)])]
+    assert told[1] == told[0]
+
+
+def test_while_waiting_for_the_end_surfaces_are_held_only_where_they_are_asked_for() -> None:
+    surface = cast("Surface", object())
+    mug, cup = replace(TRACKED, surface=surface), replace(TRACKED, object_id="cup", surface=surface)
+    writer = Taken()
+    output = PoseOutput([writer], smooth="offline", located=["cup"])
+    output.add(frame(0), [mug, cup])
+    output.finish()
+    assert [result.surface for result in writer.frames[0][2]] == [None, surface]

@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from tracker.errors import SourceError
-from tracker.sources.query import number, read_query, whole
+from tracker.sources.query import number, numbers, read_query, some, whole, yes_or_no
 
 READERS = {"frames": whole(1, 100), "noise": number(0, 5, "0 is clean")}
+MORE = {"topic": some, "loud": yes_or_no, "size": numbers("w", "h")}
 
 
 def test_what_is_given_is_read() -> None:
@@ -31,3 +32,27 @@ def test_what_is_given_is_read() -> None:
 def test_what_is_not_known_is_refused_with_what_there_is(query: str, complaint: str) -> None:
     with pytest.raises(SourceError, match=complaint):
         read_query("cam:7", query, READERS)
+
+
+def test_text_answers_and_several_numbers_are_read() -> None:
+    assert read_query("cam:7", "topic=/a/b&loud=yes&size=1,2.5", MORE) == {
+        "topic": "/a/b",
+        "loud": True,
+        "size": (1, 2.5),
+    }
+    assert read_query("cam:7", "loud=no", MORE) == {"loud": False}
+
+
+@pytest.mark.parametrize(
+    ("query", "complaint"),
+    [
+        ("topic=", "topic='': expected something after the equals sign"),
+        ("loud=maybe", "loud='maybe': expected yes or no"),
+        ("size=1", "size='1': expected 2 numbers w,h"),
+        ("size=1,x", "expected 2 numbers w,h"),
+        ("size=1,inf", "expected 2 numbers w,h"),
+    ],
+)
+def test_text_answers_and_several_numbers_are_refused_too(query: str, complaint: str) -> None:
+    with pytest.raises(SourceError, match=complaint):
+        read_query("cam:7", query, MORE)

@@ -28,12 +28,16 @@ class Track:
     """Track objects through frames, and say at every frame where they are, or that they are lost."""
 
     source: tyro.conf.Positional[str]
-    """bop:PATH:SCENE, folder:PATH, synthetic:NAME, realsense, realsense:SERIAL or realsense:FILE.db3."""
+    """bop:PATH:SCENE, folder:PATH, rosbag:PATH, synthetic:NAME, realsense, realsense:SERIAL or realsense:FILE.db3; the
+    README has them all."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE"), tyro.conf.UseAppendAction]
     """Concept model that python -m reference made; once for every object. Of two of a kind, the same file twice: the
     second one is called NAME_2."""
     out: Path | None = None
-    """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view makes."""
+    """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view and --write make."""
+    write: tuple[Literal["ob-in-cam", "tum", "bop"], ...] = ()
+    """Poses in these formats too: ob-in-cam (FoundationPose: ob_in_cam/NAME.txt, a 4x4 matrix a frame; a folder an
+    object where there are several), tum (tum/OBJECT.txt, a trajectory for evo), bop (results.csv)."""
     weights: str | None = None
     """Weights of the backend that made the models: a size, a name on the hub, or a folder."""
     device: str = "auto"
@@ -76,10 +80,12 @@ class Track:
         from tracker.first_masks import FirstMasks
         from tracker.in_order import InOrder
         from tracker.latest import Latest
-        from tracker.output import PoseLines, result_folder
+        from tracker.output import PoseLines, PoseOutput, result_folder
         from tracker.pipeline import ObjectTracker
+        from tracker.pose_files import open_pose_files
+        from tracker.ros_results import PosePublisher
         from tracker.saliency import BackendOptions, open_backend
-        from tracker.sources import LiveSource, length_of
+        from tracker.sources import LiveSource, RosSource, length_of
         from tracker.viewer import NullViewer, OverlayVideo
 
         config = self._config()
@@ -109,21 +115,28 @@ class Track:
             texts = [sys.stdout] if self.json else []
             if folder:
                 texts.append(stack.enter_context((folder / "poses.jsonl").open("w")))
-            lines = PoseLines(texts, regions, self.smooth)
+            files = open_pose_files(self.write, folder, list(regions)) if folder else []
+            located = [object_id for object_id, concepts in regions.items() if concepts]
+            outputs = [PoseOutput([PoseLines(texts, regions), *files], self.smooth, located)]
+            if isinstance(source, RosSource):
+                publisher = PosePublisher(source.ros, source.node, models, lambda: source.frame_id)
+                outputs.append(PoseOutput([publisher]))
             try:
                 for frame in frames:
                     results = tracker.step(frame if config.masks == "given" else first_masks(frame))
                     viewer.show(frame, results, {})
                     for result in results:
                         summary.add(result.object_id, result.state.value, result.timings_ms["total"])
-                        lines.add(frame.index, result)
+                    for output in outputs:
+                        output.add(frame, results)
                     if live:
                         summary.latencies_ms.append(live.latency_ms())
             except KeyboardInterrupt:
                 STDERR.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error
-            lines.finish()
+            for output in outputs:
+                output.finish()
         if frames.refused:
             STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
         for what, count in live.left_out.items() if live else ():
@@ -168,6 +181,8 @@ class Track:
 
         if self.view != "none" and self.out is None:
             raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
+        if self.write and self.out is None:
+            raise ConfigError(f"--write {' '.join(self.write)} needs a folder to write to: give --out DIR")
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})

@@ -23,12 +23,16 @@ class Provenance:
     clock: whose time `stamp_ns` is ("nominal": the recording has none and a frame rate was assumed).
     colour_depth_skew_ns: stamp of the colour picture minus that of the depth picture.
     raw_depth_unit_m: metres that one unit of the stored depth stood for (0 where it was never stored).
+    name: what the recording calls the picture, without suffix; empty where its pictures have no names.
+    bop_image: scene and image by which a dataset in BOP's layout numbers the picture.
     """
 
     source: str = "memory"
     clock: str = "unknown"
     colour_depth_skew_ns: int = 0
     raw_depth_unit_m: float = 0.0
+    name: str = ""
+    bop_image: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

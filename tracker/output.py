@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, Protocol, TextIO
 
 from tracker.errors import OutputError
+from tracker.frame import Frame, Provenance
 from tracker.geometry import Pose
 from tracker.region import Region, SeenRegion
 from tracker.result import TrackResult
@@ -58,38 +59,57 @@ def require_free(path: Path, overwrite: bool) -> None:
         raise OutputError(f"{path} holds results already; give another folder, or --overwrite")
 
 
-class PoseLines:
-    """Results as lines of JSON in one or several texts: as they come, or, smoothed, all at the end.
+class PoseWriter(Protocol):
+    """Takes the results of every frame, in the order of the frames; `provenance` is the frame's."""
 
-    regions: of every object, where on it concepts are, to be said in every line. smooth: "offline" waits for `finish`.
+    def add(self, frame_index: int, provenance: Provenance, results: Sequence[TrackResult]) -> None: ...
+
+
+class PoseOutput:
+    """Results on their way to every writer: as they come, or, smoothed, all at the end.
+
+    smooth: "offline" waits for `finish`. located: objects of which a writer asks where concepts are.
     """
 
-    def __init__(
-        self, texts: Sequence[TextIO], regions: Mapping[str, Mapping[str, Region | None]], smooth: str = "off"
-    ) -> None:
-        self._texts, self._regions, self._smooth = texts, regions, smooth
-        self._held: list[tuple[int, TrackResult]] = []
+    def __init__(self, writers: Sequence[PoseWriter], smooth: str = "off", located: Collection[str] = ()) -> None:
+        self._writers, self._smooth, self._located = writers, smooth, located
+        self._held: list[tuple[int, Provenance, Sequence[TrackResult]]] = []
 
-    def add(self, frame_index: int, result: TrackResult) -> None:
+    def add(self, frame: Frame, results: Sequence[TrackResult]) -> None:
         if self._smooth == "off":
-            self._write(frame_index, result)
+            self._write(frame.index, frame.provenance, results)
         else:  # the depth picture of every frame is held only where it is asked for
-            asked = bool(self._regions[result.object_id])
-            self._held.append((frame_index, result if asked else result.slim()))
+            kept = [r if r.object_id in self._located else r.slim() for r in results]
+            self._held.append((frame.index, frame.provenance, kept))
 
     def finish(self) -> None:
         """There are no more frames."""
-        smoothed = smooth_results([result for _, result in self._held])
-        for (frame_index, _), result in zip(self._held, smoothed, strict=True):
-            self._write(frame_index, result)
+        smoothed = iter(smooth_results([result for _, _, results in self._held for result in results]))
+        for frame_index, provenance, results in self._held:
+            self._write(frame_index, provenance, [next(smoothed) for _ in results])
         self._held = []
 
-    def _write(self, frame_index: int, result: TrackResult) -> None:
-        seen = {concept: r and result.locate(r) for concept, r in self._regions[result.object_id].items()}
-        line = as_json_line(result, frame_index, seen)
-        for text in self._texts:
-            text.write(line + "\n")
-            text.flush()  # a program at the other end of a pipe waits for the line
+    def _write(self, frame_index: int, provenance: Provenance, results: Sequence[TrackResult]) -> None:
+        for writer in self._writers:
+            writer.add(frame_index, provenance, results)
+
+
+class PoseLines:
+    """Results as lines of JSON in one or several texts.
+
+    regions: of every object, where on it concepts are, to be said in every line.
+    """
+
+    def __init__(self, texts: Sequence[TextIO], regions: Mapping[str, Mapping[str, Region | None]]) -> None:
+        self._texts, self._regions = texts, regions
+
+    def add(self, frame_index: int, provenance: Provenance, results: Sequence[TrackResult]) -> None:  # noqa: ARG002
+        for result in results:
+            seen = {concept: r and result.locate(r) for concept, r in self._regions[result.object_id].items()}
+            line = as_json_line(result, frame_index, seen)
+            for text in self._texts:
+                text.write(line + "\n")
+                text.flush()  # a program at the other end of a pipe waits for the line
 
 
 def as_json_line(result: TrackResult, frame_index: int, regions: Mapping[str, SeenRegion | None] | None = None) -> str:

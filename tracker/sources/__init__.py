@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from tracker.errors import SourceError
 from tracker.frame import Frame
@@ -70,6 +70,15 @@ class LiveSource(FrameSource, Protocol):
 
     @property
     def left_out(self) -> Mapping[str, int]: ...
+
+
+@runtime_checkable
+class RosSource(LiveSource, Protocol):
+    """A camera of a running ROS, by whose node results are published. ros: its modules. frame_id: of the pictures."""
+
+    ros: Any
+    node: Any
+    frame_id: str
 
 
 @runtime_checkable
@@ -140,14 +149,49 @@ def _synthetic(argument: str) -> PosedSource:
     return open_scene(argument)
 
 
+def _orbbec(argument: str) -> FrameSource:
+    from tracker.sources.orbbec import open_orbbec
+
+    return open_orbbec(argument)
+
+
+def _tum(argument: str) -> Recording:
+    from tracker.sources.tum import TumFolder
+
+    return TumFolder(argument)
+
+
+def _video(argument: str) -> FrameSource:
+    from tracker.sources.video import VideoWithDepth
+
+    return VideoWithDepth(argument)
+
+
+def _ros2(argument: str) -> FrameSource:
+    from tracker.sources.ros2 import open_ros2
+
+    return open_ros2(argument)
+
+
+def _rosbag(argument: str) -> FrameSource:
+    from tracker.sources.rosbag import RosBag
+
+    return RosBag(argument)
+
+
 SOURCES: dict[str, Callable[[str], FrameSource]] = {
     "bop": _bop,
     "folder": _folder,
+    "orbbec": _orbbec,
     "realsense": _realsense,
+    "ros2": _ros2,
+    "rosbag": _rosbag,
     "synthetic": _synthetic,
+    "tum": _tum,
+    "video": _video,
 }
-WITHOUT_MASKS = ("realsense",)  # kinds that never say where an object is
-ALONE = ("realsense",)  # kinds that may stand without an argument: the only one that there is
+WITHOUT_MASKS = ("orbbec", "realsense", "ros2", "rosbag", "tum", "video")  # kinds that never say where an object is
+ALONE = ("orbbec", "realsense", "ros2")  # kinds that may stand without an argument: the only one that there is
 
 
 def kind_of(name: str) -> str:

@@ -74,8 +74,12 @@ class BopScene:
             stamp_ns=round(image_id * 1e9 / NOMINAL_RATE_HZ),
             masks=self._masks(image_id),
             index=index,
-            provenance=Provenance(f"{self.name} image {image_id}", "nominal", 0, unit_m),
+            provenance=self._provenance(image_id, unit_m),
         )
+
+    def _provenance(self, image_id: int, unit_m: float) -> Provenance:
+        where, place = f"{self.name} image {image_id}", (self.scene_id, image_id)
+        return Provenance(where, "nominal", 0, unit_m, f"{image_id:06d}", place)
 
     def camera(self, index: int) -> Intrinsics:
         """Of a frame, whose pictures are not read: they have the size of the scene's first one, as in all of BOP's."""

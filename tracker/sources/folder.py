@@ -11,14 +11,14 @@ nominal rate.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tracker.errors import FrameError, SourceError
 from tracker.frame import Frame, Mask, Provenance
 from tracker.geometry import Intrinsics, Pose
 from tracker.sources import Sighting, require_object
-from tracker.sources.image_files import read_depth_m, read_mask, read_rgb
+from tracker.sources.image_files import in_order, read_depth_m, read_mask, read_rgb
 from tracker.sources.text_files import read_numbers, read_pose
 
 METRES_PER_UNIT = 0.001
@@ -39,7 +39,7 @@ class Folder:
         self._path = Path(path)
         self.object_id = object_id
         self.name = name or f"folder:{path}"
-        self._files = _in_order(
+        self._files = in_order(
             p for p in (self._path / "rgb").glob("*") if p.suffix.lower() in (".png", ".jpg", ".jpeg")
         )
         if not self._files:
@@ -74,7 +74,7 @@ class Folder:
             stamp_ns=stamp_ns,
             masks={} if mask is None else {self.object_id: mask},
             index=index,
-            provenance=Provenance(f"{self.name} {stem}", clock, 0, METRES_PER_UNIT),
+            provenance=Provenance(f"{self.name} {stem}", clock, 0, METRES_PER_UNIT, stem),
         )
 
     @property
@@ -110,7 +110,7 @@ def _beside(folder: Path, suffix: str, stems: list[str]) -> list[str]:
     Where no file is called like a picture and there are as many, they belong together by order: poses of YCBInEOAT are
     counted, its pictures have times. Raises SourceError where neither holds.
     """
-    found = [path.stem for path in _in_order(folder.glob(f"*{suffix}"))]
+    found = [path.stem for path in in_order(folder.glob(f"*{suffix}"))]
     if not found or set(found) & set(stems):
         return stems
     if len(found) != len(stems):
@@ -119,13 +119,6 @@ def _beside(folder: Path, suffix: str, stems: list[str]) -> list[str]:
             f"{len(stems)} pictures ({stems[0]} .. {stems[-1]}) or as many files"
         )
     return found
-
-
-def _in_order(files: Iterable[Path]) -> list[Path]:
-    """By name, numbers by value."""
-    listed = list(files)
-    numbered = all(path.stem.isdecimal() for path in listed)
-    return sorted(listed, key=lambda path: (int(path.stem) if numbered else 0, path.name))
 
 
 def _stamps_ns(stems: list[str]) -> list[tuple[int, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -52,5 +53,34 @@ def number(low: float, high: float, what: str = "") -> Callable[[str], float]:
         if not low <= value <= high:
             raise ValueError(f"a number from {low:g} to {high:g}{what and f', {what}'}")
         return value
+
+    return read
+
+
+def some(value: str) -> str:
+    """Reads anything that is not empty."""
+    if not value:
+        raise ValueError("something after the equals sign")
+    return value
+
+
+def yes_or_no(value: str) -> bool:
+    """Reads yes or no."""
+    if value not in ("yes", "no"):
+        raise ValueError("yes or no")
+    return value == "yes"
+
+
+def numbers(*names: str) -> Callable[[str], tuple[float, ...]]:
+    """Reads so many finite numbers, with commas between them."""
+
+    def read(value: str) -> tuple[float, ...]:
+        try:
+            found = tuple(float(part) for part in value.split(","))
+        except ValueError:
+            found = ()
+        if len(found) != len(names) or not all(math.isfinite(number) for number in found):
+            raise ValueError(f"{len(names)} numbers {','.join(names)}")
+        return found
 
     return read
