@@ -303,7 +303,7 @@ def test_an_empty_folder_holds_no_results(model: Path, run: Run, tmp_path: Path)
         ("bop:/nowhere:1", (), ("/nowhere",)),
         (SOURCE, ("--config", "unknown.yaml"), ("'colour'", "prior", "verification", "filter")),
         (SOURCE, ("--config", "deep.yaml"), ("'filter.speed'", "acceleration_mps2", "gate")),
-        (SOURCE, ("--config", "wrong.yaml"), ("accept", "less than or equal to 1")),
+        (SOURCE, ("--config", "wrong.yaml"), ("believe", "less than or equal to 1")),
         (SOURCE, ("--config", "absent.yaml"), ("absent.yaml",)),
         (SOURCE, ("--at", "9,9"), ("masks", "carried")),
         (SOURCE, ("--masks", "carried", "--at", "left"), ("'left'", "X,Y")),
@@ -323,7 +323,7 @@ def test_tracker_refuses_what_it_does_not_know_and_leaves_no_folder(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    files = {"unknown.yaml": "colour: red", "deep.yaml": "filter: {speed: 3}", "wrong.yaml": "accept: 2"}
+    files = {"unknown.yaml": "colour: red", "deep.yaml": "filter: {speed: 3}", "wrong.yaml": "believe: 2"}
     for name, text in files.items():
         Path(name).write_text(text)
     given = [option.format(model=model) for option in options]

@@ -56,7 +56,7 @@ def test_a_config_cannot_be_changed_in_place() -> None:
 def test_an_unknown_setting_is_answered_with_the_known_ones(file: Path) -> None:
     file.write_text("temperature: 0.3\n")
     with pytest.raises(
-        ConfigError, match=r"settings\.yaml: there is no setting 'temperature'; there are prior, accept"
+        ConfigError, match=r"settings\.yaml: there is no setting 'temperature'; there are prior, believe"
     ) as caught:
         read_config(file)
     assert all(name in str(caught.value) for name in TrackerConfig.model_fields)
@@ -81,8 +81,8 @@ def test_every_stage_refuses_what_it_does_not_know() -> None:
 @pytest.mark.parametrize(
     ("content", "complaint"),
     [
-        ({"accept": 1.5}, r"accept: .*less than or equal to 1 \(got 1\.5\)"),
-        ({"accept": "high"}, r"accept: .*valid number.* \(got 'high'\)"),
+        ({"believe": 1.5}, r"believe: .*less than or equal to 1 \(got 1\.5\)"),
+        ({"believe": "high"}, r"believe: .*valid number.* \(got 'high'\)"),
         ({"view": {"pixels_across": 1}}, r"view\.pixels_across: .*greater than or equal to 8 \(got 1\)"),
         ({"cloud": {"outlier_sigmas": 0}}, r"cloud\.outlier_sigmas: .*greater than 0"),
         ({"matching": {"temperature": 0}}, r"matching\.temperature: .*greater than 0"),
@@ -98,7 +98,7 @@ def test_a_value_out_of_range_is_named_with_what_came(content: object, complaint
 
 def test_every_complaint_is_told_not_only_the_first() -> None:
     with pytest.raises(ConfigError) as caught:
-        parse_config({"accept": 2, "colour": 1, "view": {"size": 3}}, "here")
+        parse_config({"believe": 2, "colour": 1, "view": {"size": 3}}, "here")
     assert len(str(caught.value).splitlines()) == 3
 
 

@@ -336,15 +336,13 @@ def test_a_result_carries_its_evidence(can_model: ConceptModel, can_frames: list
         assert 0 <= sum(stages.values()) <= result.timings_ms["total"]
 
 
-def test_what_is_not_accepted_is_not_reported(can_model: ConceptModel, can_frames: list[Frame]) -> None:
-    """The score that is asked for decides, whatever was found."""
+def test_what_is_not_believed_is_not_reported(can_model: ConceptModel, can_frames: list[Frame]) -> None:
+    """The confidence that is asked for decides, whatever was found."""
     (result,) = tracked(can_model, can_frames[:1])
-    assert result.evidence is not None
-    score = result.evidence.score
-    for accept, state in ((score - 0.01, TrackState.TRACKING), (1.0, TrackState.INITIALISING)):
-        (again,) = tracked(can_model, can_frames[:1], TrackerConfig(accept=accept, trust=0.6))
+    for believe, state in ((result.confidence, TrackState.TRACKING), (1.0, TrackState.INITIALISING)):
+        (again,) = tracked(can_model, can_frames[:1], TrackerConfig(believe=believe))
         assert again.state is state
-    assert f"explains {score:.2f}" in again.reason
+    assert f"is right at {result.confidence:.0%}" in again.reason
 
 
 def test_an_object_is_found_by_its_own_mask_alone(can_model: ConceptModel, can_frames: list[Frame]) -> None:

@@ -93,7 +93,7 @@ def test_a_wrong_pose_is_put_right_by_what_is_known_later(
 ) -> None:
     """Told half a turn away, surface alone holds on to that; the label is what the concepts know."""
     worker = Later()
-    tracker = ObjectTracker(can_model, TrackerConfig(believe=0.0, accept=0.0), worker=worker)
+    tracker = ObjectTracker(can_model, TrackerConfig(believe=0.0), worker=worker)
     truth = can_scene.sightings(CAN)[can_frames[0].index].T_cam_obj
     turned = replace(truth, rotation=truth.rotation @ np.diag((-1.0, -1.0, 1.0)))
     tracker.place(CAN, turned, 0)

@@ -25,22 +25,21 @@ from tracker.view import ViewConfig
 
 class TrackerConfig(BaseModel):
     """prior: start from the predicted pose and search globally only where that fails; False makes every frame
-    independent, as in the paper. accept: score of the evidence (`tracker.verification.Evidence`) under which a pose
-    does not explain the object's pixels, and is not reported. trust: score from which no other pose is looked for.
-    jump: by how much a pose found elsewhere has to be better than one where it was expected: objects seldom jump, and
-    may show a side that the model does not know. sure: confidence from which a pose that fits as well as the last one
-    did is not compared with others, whatever its score. concepts_every: looks of which one asks for the concepts
-    nevertheless, where surface and colours alone lead from the prediction to such a pose. verified: candidates that are
-    refined. seed: of the sampling. device: of matching and registration, "auto" is CUDA where there is one.
-    masks: "given" by every frame, or "carried" on by the tracker itself from the first one on, which a frame's mask
-    overrules. Where nobody gives one, no pixels are known to be the object's: believe is the confidence under which a
-    pose is not reported then, regain that under which a lost object is not believed to be seen again.
-    search_every: frames between searches of the whole picture for it."""
+    independent, as in the paper. believe: confidence under which a pose is not reported. regain: the same where nobody
+    says which pixels are the object's, of a lost object that is seen again, and of one that has jumped. trust: score of
+    the evidence (`tracker.verification.Evidence`) from which no other pose is looked for. jump: by how much the score
+    may be lower than the last one for that. sure: confidence from which a pose whose score is so is not compared with
+    others either, whatever that is. concepts_every: looks of which one asks for the concepts nevertheless, where
+    surface and colours alone lead from the prediction to such a pose. verified: candidates that are refined. seed: of
+    the sampling. device: of matching and registration, "auto" is CUDA where there is one. masks: "given" by every
+    frame, or "carried" on by the tracker itself from the first one on, which a frame's mask overrules. search_every:
+    frames between searches of the whole picture for an object that is lost."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     prior: bool = True
-    accept: float = Field(default=0.25, ge=0, le=1)
+    believe: float = Field(default=0.1, ge=0, le=1)
+    regain: float = Field(default=0.3, ge=0, le=1)
     trust: float = Field(default=0.6, ge=0, le=1)
     jump: float = Field(default=0.1, ge=0, le=1)
     sure: float = Field(default=0.5, ge=0, le=1)
@@ -49,8 +48,6 @@ class TrackerConfig(BaseModel):
     seed: int = 42
     device: str = "auto"
     masks: Literal["given", "carried"] = "given"
-    believe: float = Field(default=0.1, ge=0, le=1)
-    regain: float = Field(default=0.3, ge=0, le=1)
     search_every: int = Field(default=3, ge=1)
     view: ViewConfig = ViewConfig()
     cloud: CloudConfig = CloudConfig()

@@ -56,13 +56,12 @@ class Found:
 
 
 def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeGuard[Found]:
-    """Of pixels that are said to be the object's a pose has to explain enough. Elsewhere it has to be likely: less is
-    asked where it was expected while it is followed than of what is seen again or has jumped, so that a state does not
-    flicker."""
+    """A pose has to be likely. Where nobody says which pixels are the object's, less is asked where it was expected
+    while it is followed than of what is seen again or has jumped, so that a state does not flicker."""
     if isinstance(found, str):
         return False
     if found.masked:
-        return found.score >= config.accept
+        return found.confidence >= config.believe
     goes_on = followed and found.hypothesis.origin != "search"
     likely = found.confidence >= (config.believe if goes_on else config.regain)
     return likely and found.hypothesis.evidence.surface >= LEAST_SURFACE
@@ -74,8 +73,7 @@ def why_not(found: Found | str) -> str:
         return found
     if found.missed:
         return found.missed
-    judged = f"explains {found.score:.2f} of it" if found.masked else f"is right at {found.confidence:.0%}"
-    return f"poor fit: the best pose {judged}"
+    return f"poor fit: the best pose is right at {found.confidence:.0%}"
 
 
 class Looking:
