@@ -58,13 +58,10 @@ class Found:
 def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeGuard[Found]:
     """A pose has to be likely. Where nobody says which pixels are the object's, less is asked where it was expected
     while it is followed than of what is seen again or has jumped, so that a state does not flicker."""
-    if isinstance(found, str):
+    if isinstance(found, str) or found.hypothesis.evidence.surface < LEAST_SURFACE:
         return False
-    if found.masked:
-        return found.confidence >= config.believe
-    goes_on = followed and found.hypothesis.origin != "search"
-    likely = found.confidence >= (config.believe if goes_on else config.regain)
-    return likely and found.hypothesis.evidence.surface >= LEAST_SURFACE
+    goes_on = found.masked or (followed and found.hypothesis.origin != "search")
+    return found.confidence >= (config.believe if goes_on else config.regain)
 
 
 def why_not(found: Found | str) -> str:
@@ -73,6 +70,8 @@ def why_not(found: Found | str) -> str:
         return found
     if found.missed:
         return found.missed
+    if found.hypothesis.evidence.surface < LEAST_SURFACE:
+        return f"poor fit: {found.hypothesis.evidence.surface:.0%} of what should be seen is in place"
     return f"poor fit: the best pose is right at {found.confidence:.0%}"
 
 
