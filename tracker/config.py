@@ -39,7 +39,7 @@ class TrackerConfig(BaseModel):
 
     prior: bool = True
     believe: float = Field(default=0.1, ge=0, le=1)
-    regain: float = Field(default=0.3, ge=0, le=1)
+    regain: float = Field(default=0.5, ge=0, le=1)
     trust: float = Field(default=0.6, ge=0, le=1)
     jump: float = Field(default=0.1, ge=0, le=1)
     sure: float = Field(default=0.5, ge=0, le=1)
