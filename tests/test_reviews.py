@@ -16,6 +16,7 @@ from tracker.errors import ConfigError
 from tracker.first_masks import FirstMasks
 from tracker.frame import Frame
 from tracker.pipeline import ObjectTracker
+from tracker.pointing import Click
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import Query, Saliency
 from tracker.saliency.attributes import Attributes
@@ -103,6 +104,19 @@ def test_a_wrong_pose_is_put_right_by_what_is_known_later(
     worker.work()
     (result,) = tracker.step(can_frames[1])
     assert_near(result, can_scene, can_frames[1])
+
+
+def test_what_was_seen_before_somebody_pointed_elsewhere_says_nothing(
+    can_model: ConceptModel, can_frames: list[Frame]
+) -> None:
+    worker, bare = Later(), [replace(frame, masks={}) for frame in can_frames]
+    tracker = ObjectTracker(can_model, CARRIED, worker=worker)
+    tracker.step(can_frames[0])
+    worker.work()
+    tracker.point_out(CAN, Click(2, 2))
+    for frame in bare[1:4]:
+        (result,) = tracker.step(frame)
+        assert result.pose is None
 
 
 class Broken(Attributes):

@@ -21,11 +21,12 @@ from tracker.view import ObjectView
 @dataclass(frozen=True, slots=True, eq=False)
 class Review:
     """What is to be done again, and what was known in that frame: the pose T_cam_obj that was believed, None where none
-    was, and the landmarks."""
+    was, the landmarks, and how often what was known had been forgotten by then: it says nothing after the next time."""
 
     again: Asking[Found | None]
     believed: Pose | None
     landmarks: Landmarks | None
+    forgotten: int
 
 
 class SecondLook:

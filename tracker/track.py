@@ -38,7 +38,7 @@ class Track:
         self._second_look: SecondLook | None = None
         self._filter = PoseFilter(config.filter)
         self._state = TrackState.INITIALISING
-        self._frames_lost, self._frames_followed = 0, 0
+        self._frames_lost, self._frames_followed, self._forgotten = 0, 0, 0
         self._looked: list[Look | str] = []
         self._raw: Pose | None = None
         self.shown: Mask | None = None
@@ -96,12 +96,14 @@ class Track:
             return None
         self._second_look = self._second_look or SecondLook(self._model, self._config)
         again = self._second_look(self._looked, self._places if self._searched else None, now, self._followed)
-        return Review(again, self._raw, now.camera.now)
+        return Review(again, self._raw, now.camera.now, self._forgotten)
 
     def reviewed(self, review: Review, found: Found, camera: CameraMotion) -> None:
         """What was found of it in the frame of a review says where it is now: where it has been followed since then,
         its motion is known."""
         T_then_obj = found.hypothesis.refined.T_cam_obj
+        if review.forgotten != self._forgotten:
+            return
         if self._raw is None:
             self._places.suspected(T_then_obj, review.landmarks, camera)
         elif review.believed is not None:
@@ -119,6 +121,7 @@ class Track:
         """Where it was, and how it moved."""
         self._filter = PoseFilter(self._config.filter)
         self._places.forget()
+        self._forgotten += 1
 
     def _noted(self, looks: Iterable[Look | str]) -> Iterator[Look | str]:
         for look in looks:
