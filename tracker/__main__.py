@@ -56,8 +56,9 @@ class Track:
     """YAML file with settings that differ from the defaults."""
     smooth: Literal["off", "offline"] = "off"
     """offline: every pose by all frames of the recording, also those after it; the lines are written at the end."""
-    view: Literal["none", "overlay"] = "none"
-    """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed."""
+    view: Annotated[tuple[Literal["overlay", "frames"], ...], tyro.conf.UseAppendAction] = ()
+    """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed; H.264 where the
+    program ffmpeg is installed. frames: write a PNG a frame to its folder frames. Once for each."""
     record: Path | None = None
     """Write what the camera sees to this file (.db3) while it is tracked."""
     overwrite: bool = False
@@ -80,7 +81,7 @@ class Track:
         from tracker.pipeline import ObjectTracker
         from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import LiveSource, length_of
-        from tracker.viewer import NullViewer, OverlayVideo
+        from tracker.viewer import overlay_viewer
 
         config = self._config()
         if not self.model:
@@ -99,7 +100,7 @@ class Track:
             for object_id, there in pointed_out.items():
                 tracker.point_out(object_id, there)
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
-            viewer = OverlayVideo(folder / "overlay.mp4", models) if folder and self.view == "overlay" else NullViewer()
+            viewer = overlay_viewer(self.view, folder, models)
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
@@ -166,8 +167,8 @@ class Track:
         from tracker.errors import ConfigError
         from tracker.sources import WITHOUT_MASKS, kind_of
 
-        if self.view != "none" and self.out is None:
-            raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
+        if self.view and self.out is None:
+            raise ConfigError(f"--view {self.view[0]} needs a folder to write to: give --out DIR")
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})
