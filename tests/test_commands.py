@@ -317,6 +317,19 @@ def test_a_picture_without_a_folder_to_put_it_is_refused(program: str, model: Pa
     assert_refused(run(program, *what, "--view", "overlay"), "--view overlay", "--out")
 
 
+def test_tracker_records_for_rerun_and_opens_no_window_without_a_display(
+    model: Path, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    what = ("tracker", SOURCE, "--model", model, "--quiet")
+    assert_refused(run(*what, "--view", "rerun"), "no display", "--rrd")
+    assert run(*what, "--rrd", tmp_path / "a.rrd") == Said(0, "", "")
+    assert (tmp_path / "a.rrd").stat().st_size > 10_000
+    assert_refused(run(*what, "--rrd", tmp_path / "a.rrd"), "a.rrd", "--overwrite")
+
+
 def test_tracker_takes_a_box_in_place_of_a_mask_and_two_of_a_kind(model: Path, run: Run) -> None:
     """Of the second one, which is not there, there is no pose."""
     box = bounding_box(open_scene(SCENE)[0].masks[BOX])

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tracker.config import TrackerConfig
     from tracker.pointing import Pointer
     from tracker.sources import FrameSource
+    from tracker.viewer import Viewer
 
 
 @dataclass
@@ -56,13 +57,16 @@ class Track:
     """YAML file with settings that differ from the defaults."""
     smooth: Literal["off", "offline"] = "off"
     """offline: every pose by all frames of the recording, also those after it; the lines are written at the end."""
-    view: Annotated[tuple[Literal["overlay", "frames"], ...], tyro.conf.UseAppendAction] = ()
+    view: Annotated[tuple[Literal["overlay", "frames", "rerun"], ...], tyro.conf.UseAppendAction] = ()
     """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed; H.264 where the
-    program ffmpeg is installed. frames: write a PNG a frame to its folder frames. Once for each."""
+    program ffmpeg is installed. frames: write a PNG a frame to its folder frames. rerun: open a window of
+    Rerun's (extra rerun) with all that is seen and said. Once for each."""
+    rrd: Path | None = None
+    """Write what --view rerun shows to this file (.rrd), to be opened anywhere (extra rerun)."""
     record: Path | None = None
     """Write what the camera sees to this file (.db3) while it is tracked."""
     overwrite: bool = False
-    """Replace results that are in the --out folder, and the --record file."""
+    """Replace results that are in the --out folder, and the --record and --rrd files."""
     json: bool = False
     """Write the lines of poses.jsonl to the standard output as they come."""
     quiet: bool = False
@@ -81,7 +85,6 @@ class Track:
         from tracker.pipeline import ObjectTracker
         from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import LiveSource, length_of
-        from tracker.viewer import overlay_viewer
 
         config = self._config()
         if not self.model:
@@ -100,7 +103,7 @@ class Track:
             for object_id, there in pointed_out.items():
                 tracker.point_out(object_id, there)
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
-            viewer = overlay_viewer(self.view, folder, models)
+            viewer = self._viewer(folder, models)
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
@@ -149,6 +152,19 @@ class Track:
                 raise ConfigError(f"--at {text}: of which object? Write NAME={text}, NAME one of {known}")
             yield name if separator else models[0].object_id, parse_pointer(there)
 
+    def _viewer(self, folder: Path | None, models: Sequence[ConceptModel]) -> Viewer:
+        """Raises as `RerunLog` does, and OutputError where its file is there already."""
+        from tracker.output import require_free
+        from tracker.rerun_log import RerunLog
+        from tracker.viewer import Several, overlay_viewer
+
+        drawn, window = overlay_viewer(self.view, folder, models), "rerun" in self.view
+        if not window and self.rrd is None:
+            return drawn
+        if self.rrd is not None:
+            require_free(self.rrd, self.overwrite)
+        return Several((drawn, RerunLog(models, self.rrd, window=window)))
+
     def _opened_source(self) -> FrameSource:
         """Raises SourceError and OutputError, also where it cannot be recorded as it is asked for."""
         from tracker.output import require_free
@@ -167,8 +183,9 @@ class Track:
         from tracker.errors import ConfigError
         from tracker.sources import WITHOUT_MASKS, kind_of
 
-        if self.view and self.out is None:
-            raise ConfigError(f"--view {self.view[0]} needs a folder to write to: give --out DIR")
+        for view in self.view:
+            if view != "rerun" and self.out is None:
+                raise ConfigError(f"--view {view} needs a folder to write to: give --out DIR")
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})

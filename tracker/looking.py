@@ -42,13 +42,15 @@ class Look:
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """A pose, and what speaks for it. masked: by pixels that are known to be the object's. missed: why it did not even
-    show at the first place where it was looked for; empty where something did."""
+    show at the first place where it was looked for; empty where something did. saliency: what concepts said there, None
+    where surface and colours were enough."""
 
     hypothesis: Hypothesis
     grounds: Grounds
     confidence: float
     masked: bool
     missed: str = ""
+    saliency: Saliency | None = None
 
     @property
     def score(self) -> float:
@@ -144,7 +146,8 @@ class Looking:
             best = self._likeliest(best, self._search.anywhere(sight, cloud, clock), look)
         if best is None:
             return "poor fit: no pose explains what is seen"
-        return self._likeliest(best, self._search.turned(best.hypothesis, sight, clock), look) or best
+        best = self._likeliest(best, self._search.turned(best.hypothesis, sight, clock), look) or best
+        return replace(best, saliency=saliency)
 
     def _continued(self, look: Look, sight: Sight, clock: Stopwatch) -> Found | None:
         hypothesis = None if look.start is None else self._search.continued(look.start, sight, clock)

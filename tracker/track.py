@@ -163,7 +163,9 @@ class Track:
             raw_pose=raw,
             grounds=found.grounds,
             timings_ms=now.clock.timings_ms(),
-            surface=Surface(self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera),
+            surface=Surface(
+                self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera, found.saliency
+            ),
             step=filtered.step,
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Protocol
 
@@ -44,6 +45,22 @@ def overlay_viewer(views: Collection[str], folder: Path | None, models: Sequence
     video = folder / VIDEO if folder and "overlay" in views else None
     pictures = folder / FRAMES if folder and "frames" in views else None
     return OverlayFiles(models, video, pictures) if video or pictures else NullViewer()
+
+
+class Several:
+    """Viewers that each get every frame."""
+
+    def __init__(self, viewers: Sequence[Viewer]) -> None:
+        self._viewers = viewers
+
+    def show(self, frame: Frame, results: Sequence[TrackResult], truth: Mapping[str, Pose]) -> None:
+        for viewer in self._viewers:
+            viewer.show(frame, results, truth)
+
+    def close(self) -> None:
+        with ExitStack() as stack:  # all of them, also where one fails
+            for viewer in self._viewers:
+                stack.callback(viewer.close)
 
 
 class OverlayFiles:
