@@ -81,8 +81,9 @@ class Reference:
     """Turns after which the object looks the same: auto detects them, none, or declared ones such as z:inf (any angle
     about its z axis), x:180, z:90, several joined by commas."""
     ask: Ask = field(default_factory=Ask)
-    show: Literal["none", "concepts"] = "none"
-    """concepts: write a picture of the concepts' maps beside the model (mug.concept -> mug.concepts.png)."""
+    show: Annotated[tuple[Literal["concepts", "views"], ...], tyro.conf.UseAppendAction] = ()
+    """Write pictures beside the model (mug.concept -> mug.concepts.png, mug.views.png). concepts: their maps in every
+    reference view. views: the reference views, and where on the viewing sphere they are. Once for each."""
     config: Path | None = None
     """YAML file with settings that differ from the defaults (view and cloud are used here)."""
     overwrite: bool = False
@@ -90,6 +91,8 @@ class Reference:
 
     def __call__(self) -> None:
         from reference.plate import write_concept_plate
+        from reference.sheet import write_png
+        from reference.view_plate import view_plate
         from reference.vocabulary import read_vocabulary
         from tracker.config import read_config
         from tracker.errors import ConfigError
@@ -103,10 +106,9 @@ class Reference:
             raise ConfigError(f"--least-confidence: expected a number from 0 to 1, got {self.least_confidence:g}")
         if self.vocabulary is not None and self.ask.category is not None:
             raise ConfigError("--vocabulary and --ask.category both name concepts: give one of them")
-        plate = self.out.with_suffix(".concepts.png") if self.show == "concepts" else None
-        for path in (self.out, plate):
-            if path is not None:
-                require_free(path, self.overwrite)
+        plates = {show: self.out.with_suffix(f".{show}.png") for show in self.show}
+        for path in (self.out, *plates.values()):
+            require_free(path, self.overwrite)
         config, symmetry = read_config(self.config), self._symmetry()
         labels = read_vocabulary(self.vocabulary).for_object(self.object).labels if self.vocabulary else None
         backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
@@ -114,8 +116,10 @@ class Reference:
         make = self._unposed if self.unposed else self._posed
         model = make(source, backend, config, labels, symmetry)
         model.save(self.out)
-        if plate is not None:
-            write_concept_plate(plate, model, backend)
+        if "concepts" in plates:
+            write_concept_plate(plates["concepts"], model, backend)
+        if "views" in plates:
+            write_png(plates["views"], view_plate(model))
         STDERR.print(_verdict(model, self.out))
 
     def _posed(

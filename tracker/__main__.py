@@ -34,7 +34,8 @@ class Track:
     """Concept model that python -m reference made; once for every object. Of two of a kind, the same file twice: the
     second one is called NAME_2."""
     out: Path | None = None
-    """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view makes."""
+    """Folder for poses.jsonl (a line a frame and object), config.yaml, run.json (what else it takes to do this again, as
+    python -m eval plate does) and what --view makes."""
     weights: str | None = None
     """Weights of the backend that made the models: a size, a name on the hub, or a folder."""
     device: str = "auto"
@@ -84,6 +85,7 @@ class Track:
         from tracker.output import PoseLines, result_folder
         from tracker.pipeline import ObjectTracker
         from tracker.saliency import BackendOptions, open_backend
+        from tracker.saved_run import SavedRun
         from tracker.sources import LiveSource, length_of
 
         config = self._config()
@@ -107,6 +109,7 @@ class Track:
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
+                SavedRun(self.source, tuple(map(str, self.model)), self.weights, self.device, self.at).save(folder)
             coming = stack.enter_context(live) if live else source
             shown = coming if self.quiet or self.json else progress(coming, length_of(source), "tracking")
             frames = InOrder(shown, live=live is not None)

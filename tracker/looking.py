@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeGuard, TypeVar
@@ -18,6 +19,7 @@ from tracker.stopwatch import Stopwatch
 from tracker.view import ObjectView, view_object
 
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
+MOST_TRIED = 64  # poses that are remembered
 STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
 
 T = TypeVar("T")
@@ -57,6 +59,15 @@ class Found:
         return self.hypothesis.evidence.score
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Attempt:
+    """How one object was looked for in a frame. looks: where, one after the other, or why nowhere. tried: the poses
+    that were found and judged, there and in the whole picture."""
+
+    looks: tuple[Look | str, ...]
+    tried: tuple[Found, ...]
+
+
 def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeGuard[Found]:
     """Of pixels that are said to be the object's a pose has to explain enough. Elsewhere it has to be likely: less is
     asked where it was expected while it is followed than of what is seen again or has jumped, so that a state does not
@@ -81,7 +92,8 @@ def why_not(found: Found | str) -> str:
 
 
 class Looking:
-    """For one model. waiting: whether it did without concepts that it asked for, since somebody set that to False."""
+    """For one model. waiting: whether it did without concepts that it asked for, since somebody set that to False.
+    tried: what was found lately, believed or not, since somebody cleared it."""
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
@@ -89,6 +101,7 @@ class Looking:
         self._without_concepts = 0  # looks in a row that did without
         self._usual = 0.0  # score of what was believed last
         self.waiting = False
+        self.tried: deque[Found] = deque(maxlen=MOST_TRIED)
 
     def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
         """The likeliest of what the looks find, no further than the first that leaves no doubt; or why there is
@@ -173,7 +186,9 @@ class Looking:
 
     def _found(self, hypothesis: Hypothesis, look: Look) -> Found:
         grounds = self._grounds(hypothesis, look.expected)
-        return Found(hypothesis, grounds, confidence(grounds), look.masked)
+        found = Found(hypothesis, grounds, confidence(grounds), look.masked)
+        self.tried.append(found)
+        return found
 
     def _grounds(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> Grounds:
         refined, symmetry = hypothesis.refined, self._model.symmetry
