@@ -26,7 +26,9 @@ def view_plate(model: ConceptModel, width: int = WIDTH_PX) -> Picture:
     top = MARGIN_PX + 2 * line
     below = top + disc + 3 * line
     sheet = Sheet(width, below + (len(lines) + 1) * line)
-    sheet.write(f"{model.object_id}: {len(model.references)} reference views, backend {model.backend}", MARGIN_PX, MARGIN_PX)
+    sheet.write(
+        f"{model.object_id}: {len(model.references)} reference views, backend {model.backend}", MARGIN_PX, MARGIN_PX
+    )
     for side, name in ((1, "from +z"), (-1, "from -z")):
         left = MARGIN_PX if side > 0 else 2 * MARGIN_PX + disc
         sheet.put(_half_sphere(model.view_directions, side, disc, line), left, top)
@@ -56,7 +58,7 @@ def _half_sphere(directions: Floats, side: int, size: int, line: int) -> Picture
             continue
         reach = 1 / np.sqrt(1 + side * direction[2])
         place = (np.array((side * direction[0], -direction[1])) * reach + 1) / 2 * (size - 1)
-        at = (int(round(place[0])), int(round(place[1])))
+        at = (round(float(place[0])), round(float(place[1])))
         cv2.circle(disc, at, line // 2 + 2, MARK, -1, cv2.LINE_AA)
         text_at = (at[0] - line // 4 - (4 if number > 9 else 0), at[1] + line // 4 + 1)
         cv2.putText(disc, str(number), text_at, cv2.FONT_HERSHEY_SIMPLEX, line / 38, (255, 255, 255), 1, cv2.LINE_AA)
@@ -82,7 +84,8 @@ def _said(model: ConceptModel) -> list[str]:
     said = [f"{len(model)} points, diameter seen {model.diameter_m * 1000:.0f} mm, symmetry: {model.symmetry}"]
     if quality:
         said.append(
-            f"{quality['coverage']:.0%} of the viewing sphere within {np.degrees(SEEN_WITHIN_RAD):.0f} degrees of a view; "
+            f"{quality['coverage']:.0%} of the viewing sphere within {np.degrees(SEEN_WITHIN_RAD):.0f} degrees "
+            "of a view; "
             f"{quality['shared']:.0%} of the points seen twice, agreeing to {quality['agreement']:.2f}"
         )
         said += [f"missing: {problem}" for problem in quality["problems"]]

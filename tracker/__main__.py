@@ -34,8 +34,8 @@ class Track:
     """Concept model that python -m reference made; once for every object. Of two of a kind, the same file twice: the
     second one is called NAME_2."""
     out: Path | None = None
-    """Folder for poses.jsonl (a line a frame and object), config.yaml, run.json (what else it takes to do this again, as
-    python -m eval plate does) and what --view makes."""
+    """Folder for poses.jsonl (a line a frame and object), config.yaml, run.json (what else it takes to do this again,
+    as python -m eval plate does) and what --view makes."""
     weights: str | None = None
     """Weights of the backend that made the models: a size, a name on the hub, or a folder."""
     device: str = "auto"

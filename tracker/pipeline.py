@@ -115,8 +115,8 @@ class ObjectTracker:
         return tuple(results)
 
     def attempt(self, object_id: str) -> Attempt:
-        """How an object was looked for in the last frame, to see why it was not found. Raises ConfigError where there is
-        no model of it."""
+        """How an object was looked for in the last frame, to see why it was not found. Raises ConfigError where there
+        is no model of it."""
         return self._track_of(object_id).attempt
 
     @property

@@ -56,8 +56,8 @@ class SavedRun:
 class Replay:
     """A saved run, done again up to wherever it is of interest: with the same files and code it comes out the same.
 
-    Where concepts were asked later, by a worker, it does not: here they are asked at once. Raises as what it opens does,
-    and SourceError where the source was a camera, whose frames come once.
+    Where concepts were asked later, by a worker, it does not: here they are asked at once. Raises as what it opens
+    does, and SourceError where the source was a camera, whose frames come once.
     """
 
     def __init__(self, folder: Path) -> None:

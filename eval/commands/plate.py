@@ -11,10 +11,10 @@ import tyro
 from tracker.terminal import STDERR, progress
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
-
+    from reference.sheet import Picture
     from tracker.frame import Frame, Mask
+    from tracker.geometry import Pose
+    from tracker.looking import Attempt
     from tracker.result import TrackResult
     from tracker.saved_run import Replay
 
@@ -97,35 +97,31 @@ class Plate:
     def _wanted(self, replay: Replay) -> tuple[Frame, TrackResult]:
         """Raises ConfigError where there is no such frame."""
         from tracker.errors import ConfigError
-        from tracker.result import TrackState
         from tracker.sources import length_of
 
-        ended, seen = -1, set()
+        seen: set[str] = set()
         frames = iter(replay)
         for frame, results in frames if self.quiet else progress(frames, length_of(replay.source), "tracking again"):
-            ended = frame.index
             for result in results:
-                if self.object not in (None, result.object_id) or self.frame not in (None, frame.index):
-                    continue
-                lost = result.pose is None
-                fits = lost if self.kind == "failure" else not lost
-                if self.frame is None:
-                    again = result.object_id in seen
-                    fits = fits and (result.state is TrackState.LOST if self.kind == "failure" else again)
-                if not lost:
-                    seen.add(result.object_id)
-                if fits:
+                asked = self.object in (None, result.object_id) and self.frame in (None, frame.index)
+                if asked and self._fits(result, result.object_id in seen):
                     return frame, result
-                if self.frame is not None and self.object is not None:
-                    break
-            if self.frame is not None and frame.index >= self.frame:
+                if result.pose is not None:
+                    seen.add(result.object_id)
+            if frame.index == self.frame:
                 break
-        what = "is lost" if self.kind == "failure" else "has a pose"
-        where = f"in frame {self.frame}" if self.frame is not None else f"in any of the frames up to {ended}"
-        raise ConfigError(f"{self.kind}: {self.object or 'no object'} {what} {where}" if not self.object else
-                          f"{self.kind}: {self.object} {what} not {where}")  # fmt: skip
+        state = "lost" if self.kind == "failure" else "tracked"
+        where = "no frame" if self.frame is None else f"frame {self.frame} not"
+        raise ConfigError(f"{self.kind} shows {self.object or 'an object'} where it is {state}: in {where}")
 
-    def _drawn(self, replay: Replay, frame: Frame, result: TrackResult) -> npt.NDArray[np.uint8]:
+    def _fits(self, result: TrackResult, seen_before: bool) -> bool:
+        from tracker.result import TrackState
+
+        if self.kind == "failure":
+            return result.pose is None and (self.frame is not None or result.state is TrackState.LOST)
+        return result.pose is not None and (self.frame is not None or seen_before)
+
+    def _drawn(self, replay: Replay, frame: Frame, result: TrackResult) -> Picture:
         from eval.plates.failure import failure_plate
         from eval.plates.matches import match_plate
         from tracker.overlay import Shape
@@ -134,12 +130,13 @@ class Plate:
         if result.pose is None:
             attempt = replay.tracker.attempt(result.object_id)
             return failure_plate(frame, result, attempt, Shape.of(model.points), replay.config, self.width)
-        mask = _pixels(replay, result)
-        return match_plate(frame, mask, result.pose, model, replay.backend, replay.config, self.width)
+        attempt = replay.tracker.attempt(result.object_id)
+        return match_plate(
+            frame, _pixels(attempt, result.pose), result.pose, model, replay.backend, replay.config, self.width
+        )
 
 
-def _pixels(replay: Replay, result: TrackResult) -> Mask:
-    """Those by which it was found: of the poses that were tried, the one that is told."""
-    raw = result.raw_pose or result.pose
-    tried = replay.tracker.attempt(result.object_id).tried
-    return min(tried, key=lambda f: f.hypothesis.refined.T_cam_obj.distance_to_m(raw)).hypothesis.view.mask if raw else tried[0].hypothesis.view.mask
+def _pixels(attempt: Attempt, T_cam_obj: Pose) -> Mask:
+    """Those by which the pose was found: of the tried ones, the nearest."""
+    nearest = min(attempt.tried, key=lambda found: found.hypothesis.refined.T_cam_obj.distance_to_m(T_cam_obj))
+    return nearest.hypothesis.view.mask

@@ -18,8 +18,8 @@ LEAST_PX = 40  # of the frame, on the shorter side
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cutout:
-    """rgb: (h, w, 3) uint8. camera: of these pixels. left, top: its corner in the frame. scale: its pixels in one of the
-    frame."""
+    """rgb: (h, w, 3) uint8. camera: of these pixels. left, top: its corner in the frame. scale: its pixels in one
+    of the frame."""
 
     rgb: Picture
     camera: Intrinsics
@@ -39,7 +39,7 @@ def cut_out(frame: Frame, around: Floats, width: int, height: int) -> Cutout:
     scale = float(min(width / size[0], height / size[1]))
     left, top = ((low + high) / 2 - np.array((width, height)) / scale / 2).tolist()
     shift = np.array([[scale, 0, -scale * left], [0, scale, -scale * top]])
-    rgb = cv2.warpAffine(frame.rgb, shift, (width, height), flags=cv2.INTER_LINEAR, borderValue=(90, 90, 90))
+    rgb = cv2.warpAffine(frame.rgb, shift, (width, height), flags=cv2.INTER_LINEAR, borderValue=(255, 255, 255))
     seen = frame.intrinsics
     camera = Intrinsics(
         seen.fx * scale, seen.fy * scale, scale * (seen.cx - left), scale * (seen.cy - top), width, height

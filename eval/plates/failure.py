@@ -58,8 +58,11 @@ def failure_plate(
 
 def _asked(result: TrackResult, attempt: Attempt, config: TrackerConfig) -> list[str]:
     """What it takes to be believed, and why there was nowhere to look."""
-    asked = [f"with a mask a score of {config.accept:.2f} is asked; without one, that a pose is {config.believe:.0%} likely "
-             f"where it is followed and {config.regain:.0%} where it is seen again"]  # fmt: skip
+    asked = [f"of the given mask a pose has to explain enough: a score of {config.accept:.2f}"]
+    if config.masks == "carried":
+        asked = [
+            f"a pose has to be {config.believe:.0%} likely where it is followed, {config.regain:.0%} where it is not"
+        ]
     reasons = dict.fromkeys(look for look in attempt.looks if isinstance(look, str) and look != result.reason)
     return asked + [f"also: {reason}" for reason in reasons]
 
@@ -73,9 +76,9 @@ def _where(frame: Frame, attempt: Attempt, shape: Shape) -> Picture:
     for mask in masks:
         lines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         cv2.drawContours(picture, lines, -1, LOOKED, 2, cv2.LINE_AA)
-    for look in looks:
-        if look.start is not None:
-            draw_box(picture, frame.intrinsics, look.start, shape.corners, EXPECTED, 2)
+    starts = [look.start for look in looks if look.start is not None]
+    for k, start in enumerate(starts):
+        draw_box(picture, frame.intrinsics, start, shape.corners, EXPECTED, 1 if k else 2)
     return picture
 
 
@@ -85,7 +88,14 @@ def _candidate(frame: Frame, found: Found, shape: Shape, width: int, height: int
     cutout = cut_out(frame, around, width, height)
     lines, _ = cv2.findContours(found.hypothesis.view.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     for line in lines:
-        cv2.polylines(cutout.rgb, [np.rint(cutout.at(line[:, 0])).astype(np.int32)], True, LOOKED, 1, cv2.LINE_AA)
+        cv2.polylines(
+            cutout.rgb,
+            [np.rint(cutout.at(np.asarray(line[:, 0], float))).astype(np.int32)],
+            True,
+            LOOKED,
+            1,
+            cv2.LINE_AA,
+        )
     cv2.polylines(cutout.rgb, outline(shape, pose, cutout.camera), True, TRIED, 1, cv2.LINE_AA)
     draw_box(cutout.rgb, cutout.camera, pose, shape.corners, TRIED, 2)
     return cutout.rgb

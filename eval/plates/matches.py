@@ -1,6 +1,8 @@
-"""A picture of which points of a frame were taken for which points of a model, and which of these matches were right."""
+"""A picture of which points of a frame were taken for which of a model, and which of these matches were right."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -16,7 +18,7 @@ from tracker.frame import Frame, Mask, PosedFrame
 from tracker.geometry import Floats, Pose
 from tracker.matching import Correspondences, Matcher
 from tracker.saliency import Query, SaliencyBackend
-from tracker.view import view_object
+from tracker.view import bounding_box, view_object
 
 INLIER, OUTLIER = (0, 158, 115), (213, 94, 0)  # RGB, of Okabe and Ito
 SAME_PLACE = 0.1  # of the diameter: as near as the matcher counts a place as the same
@@ -45,10 +47,11 @@ def match_plate(
     line, half = line_px(width), (width - 3 * MARGIN_PX) // 2
     top, height = MARGIN_PX + 2 * line, half * 3 // 4
     sheet = Sheet(width, top + height + 3 * line)
-    sheet.write(f"{model.object_id}, frame {frame.index}: {len(matches)} matches of {len(cloud)} points to "
-                f"{len(model)}, {np.count_nonzero(right)} within {SAME_PLACE:.0%} of the diameter", MARGIN_PX, MARGIN_PX)  # fmt: skip
+    title = f"{model.object_id}, frame {frame.index}: {len(matches)} matches of {len(cloud)} points to {len(model)}, "
+    title += f"{np.count_nonzero(right)} within {SAME_PLACE:.0%} of the diameter"
+    sheet.write(title, MARGIN_PX, MARGIN_PX)
     seen = cut_out(frame, corners_of(mask), half, height)
-    known = cut_out(reference.frame, corners_of(reference.mask), half, height)
+    known = cut_out(_on_paper(reference), corners_of(reference.mask), half, height)
     lefts = MARGIN_PX, 2 * MARGIN_PX + half
     for left, cutout in zip(lefts, (seen, known), strict=True):
         sheet.put(cutout.rgb, left, top)
@@ -71,10 +74,21 @@ def match_plate(
 
 
 def _right(matches: Correspondences, cloud: PointCloud, model: ConceptModel, T_cam_obj: Pose) -> npt.NDArray[np.bool_]:
-    """(M,) those whose ends are at the same place under the pose, or one that the symmetry makes the same."""
-    found = T_cam_obj.inverse() @ cloud.points[matches.query_index]
-    off_m = np.linalg.norm(found - model.points[matches.model_index], axis=1)
+    """(M,) those whose ends are at the same place under the pose, or one that looks the same."""
+    seen, known = cloud.points[matches.query_index], model.points[matches.model_index]
+    found = [pose.inverse() @ seen for pose in model.symmetry.equivalents(T_cam_obj)]
+    off_m = np.min([np.linalg.norm(_place(each, model) - _place(known, model), axis=1) for each in found], axis=0)
     return np.asarray(off_m < SAME_PLACE * model.diameter_m, bool)
+
+
+def _place(points: Floats, model: ConceptModel) -> Floats:
+    """Where points (N, 3) are on the object; if it is a solid of revolution, how far along the axis and off it."""
+    axis = model.symmetry.axis
+    if axis is None:
+        return points
+    arms = points - model.symmetry.origin_m
+    along = arms @ axis
+    return np.stack((along, np.linalg.norm(arms - along[:, None] * axis, axis=1)), axis=1)
 
 
 def _nearest_view(model: ConceptModel, T_cam_obj: Pose) -> PosedFrame:
@@ -82,6 +96,17 @@ def _nearest_view(model: ConceptModel, T_cam_obj: Pose) -> PosedFrame:
     cameras = [reference.T_cam_obj.inverse().translation_m for reference in model.references]
     cosines = [here @ there / (np.linalg.norm(here) * np.linalg.norm(there)) for there in cameras]
     return model.references[int(np.argmax(cosines))]
+
+
+def _on_paper(reference: PosedFrame) -> Frame:
+    """The reference frame, white where nothing was kept of it."""
+    rgb = reference.frame.rgb.copy()
+    box = bounding_box(reference.mask)
+    if box is not None:
+        kept = rgb[box.y0 : box.y1, box.x0 : box.x1].copy()
+        rgb[:] = 255
+        rgb[box.y0 : box.y1, box.x0 : box.x1] = kept
+    return replace(reference.frame, rgb=rgb)
 
 
 def _shown(matches: Correspondences, model: ConceptModel, reference: PosedFrame) -> npt.NDArray[np.bool_]:
