@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from rich.table import Table
 
-from tracker.terminal import STDERR, run
+from tracker.terminal import STDERR, hush, run, say_json
 
 if TYPE_CHECKING:
     from tracker.concept import ConceptModel
@@ -88,6 +88,10 @@ class Reference:
     """YAML file with settings that differ from the defaults (view and cloud are used here)."""
     overwrite: bool = False
     """Replace the file if it exists."""
+    json: bool = False
+    """Write what the model is to the standard output, as a line of JSON, and no tables."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from reference.plate import write_concept_plate
@@ -100,6 +104,7 @@ class Reference:
         from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import open_source
 
+        hush(self.quiet or self.json)
         if self.views < 1:
             raise ConfigError(f"--views: at least one reference frame is needed, got {self.views}")
         if not 0 <= self.least_confidence <= 1:
@@ -121,6 +126,8 @@ class Reference:
         if "views" in plates:
             write_png(plates["views"], view_plate(model))
         STDERR.print(_verdict(model, self.out))
+        if self.json:
+            say_json(_facts(model, self.out))
 
     def _posed(
         self,
@@ -161,6 +168,19 @@ class Reference:
                 "expected auto or none"
             )
         return None if self.symmetry == "auto" else parse_symmetry(self.symmetry)
+
+
+def _facts(model: ConceptModel, path: Path) -> dict[str, object]:
+    """What the verdict says, for other programs."""
+    return {
+        "model": str(path),
+        "object": model.object_id,
+        "backend": model.backend,
+        "labels": list(model.labels),
+        "diameter_m": model.diameter_m,
+        "symmetry": str(model.symmetry),
+        "notes": model.notes,
+    }
 
 
 def _verdict(model: ConceptModel, path: Path) -> Table:

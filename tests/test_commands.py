@@ -755,3 +755,37 @@ def test_a_plate_of_a_failure_is_the_first_one_in_the_run_or_of_the_frame_that_i
     assert_refused(run("eval", "plate", "matches", folder, "--frame", 2, "--quiet"), "tracked", "frame 2")
     assert_refused(run("eval", "plate", "failure", folder, "--object", "cup"), "cup", BOX)
     assert_refused(run("eval", "plate", "failure", tmp_path, "--quiet"), "run.json")
+
+
+# what they say
+
+
+def test_with_json_the_standard_output_is_json_and_nothing_else_is_said(run: Run, tmp_path: Path) -> None:
+    said = run("reference", SOURCE, "--object", BOX, "--out", tmp_path / "a.concept", "--json")
+    assert said.code == 0
+    facts = json.loads(said.out)
+    assert (facts["object"], facts["model"]) == (BOX, str(tmp_path / "a.concept"))
+    assert facts["notes"]["quality"]["points"] > 0
+    said = run("eval", "track", "--dataset", SOURCE, "--objects", BOX, "--json")
+    assert said.code == 0
+    scores = json.loads(said.out)
+    assert scores["metrics"]["pooled"]["instances"] > 0
+    assert scores["latency_ms"]["median"] > 0
+    assert "Percent" not in said.err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("reference", SOURCE, "--object", BOX, "--out", "a.concept"),
+        ("eval", "track", "--dataset", SOURCE, "--objects", BOX),
+        ("eval", "scenarios", "hand", "--seeds", 1, "--size", "160x120"),
+    ],
+)
+def test_quiet_they_say_nothing_but_what_is_wrong(
+    command: tuple[object, ...], run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = run(*command, "--quiet")
+    assert (said.code, said.out) == (0, "")
+    assert [line for line in said.err.splitlines() if "model of object" not in line and "reference" not in line] == []

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from rich.table import Table
 
-from tracker.terminal import STDERR, progress, run
+from tracker.terminal import ALWAYS, STDERR, hush, progress, run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tracker.concept import ConceptModel
     from tracker.config import TrackerConfig
     from tracker.pointing import Pointer
+    from tracker.result import TrackResult
     from tracker.sources import FrameSource
     from tracker.viewer import Viewer
 
@@ -88,6 +89,7 @@ class Track:
         from tracker.saved_run import SavedRun
         from tracker.sources import LiveSource, length_of
 
+        hush(self.quiet or self.json)
         config = self._config()
         if not self.model:
             raise ConfigError("--model: at least one concept model is needed; python -m reference makes one")
@@ -111,7 +113,7 @@ class Track:
                 (folder / "config.yaml").write_text(dump_config(config))
                 SavedRun(self.source, tuple(map(str, self.model)), self.weights, self.device, self.at).save(folder)
             coming = stack.enter_context(live) if live else source
-            shown = coming if self.quiet or self.json else progress(coming, length_of(source), "tracking")
+            shown = progress(coming, length_of(source), "tracking", summary.now)
             frames = InOrder(shown, live=live is not None)
             texts = [sys.stdout] if self.json else []
             if folder:
@@ -122,26 +124,25 @@ class Track:
                     results = tracker.step(frame if config.masks == "given" else first_masks(frame))
                     viewer.show(frame, results, {})
                     for result in results:
-                        summary.add(result.object_id, result.state.value, result.timings_ms["total"])
+                        summary.add(result)
                         lines.add(frame.index, result)
                     if live:
                         summary.latencies_ms.append(live.latency_ms())
             except KeyboardInterrupt:
-                STDERR.print("stopped; what was tracked is kept")
+                ALWAYS.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error
             lines.finish()
         if frames.refused:
-            STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
+            ALWAYS.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
         for what, count in live.left_out.items() if live else ():
             if count:
-                STDERR.print(f"{count} frames {what}")
+                ALWAYS.print(f"{count} frames {what}")
         if tracker.frames_without_concepts:
-            STDERR.print(f"{tracker.frames_without_concepts} frames went without concepts that were asked for")
+            ALWAYS.print(f"{tracker.frames_without_concepts} frames went without concepts that were asked for")
         if failure:
             raise failure
-        if not self.quiet and not self.json:
-            STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
+        STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
 
     def _pointers(self, models: Sequence[ConceptModel]) -> Iterator[tuple[str, Pointer]]:
         """Raises ConfigError where it is not clear which object is meant, or where it is."""
@@ -211,10 +212,17 @@ class _Summary:
     states: Counter[tuple[str, str]] = field(default_factory=Counter)
     times_ms: dict[str, list[float]] = field(default_factory=dict)
     latencies_ms: list[float] = field(default_factory=list)
+    last: dict[str, str] = field(default_factory=dict)
 
-    def add(self, object_id: str, state: str, total_ms: float) -> None:
+    def add(self, result: TrackResult) -> None:
+        object_id, state = result.object_id, result.state.value
         self.states[object_id, state] += 1
-        self.times_ms.setdefault(object_id, []).append(total_ms)
+        self.times_ms.setdefault(object_id, []).append(result.timings_ms["total"])
+        self.last[object_id] = state
+
+    def now(self) -> str:
+        """How many objects are in which state."""
+        return ", ".join(f"{count} {state}" for state, count in Counter(self.last.values()).items())
 
     def table(self, since: str) -> Table:
         """since: what the latency is counted from."""

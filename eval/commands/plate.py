@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from tracker.terminal import STDERR, progress
+from tracker.terminal import STDERR, hush, progress
 
 if TYPE_CHECKING:
     from reference.sheet import Picture
@@ -53,9 +53,9 @@ class Plate:
 
         if self.width < 320:
             raise ConfigError(f"--width: expected at least 320 pixels, got {self.width}")
+        hush(self.quiet)
         path = self._of_model() if self.kind in MODEL_PLATES else self._of_run()
-        if not self.quiet:
-            STDERR.print(f"written to {path}", highlight=False, soft_wrap=True)
+        STDERR.print(f"written to {path}", highlight=False, soft_wrap=True)
 
     def _of_model(self) -> Path:
         from reference.plate import write_concept_plate
@@ -101,7 +101,7 @@ class Plate:
 
         seen: set[str] = set()
         frames = iter(replay)
-        for frame, results in frames if self.quiet else progress(frames, length_of(replay.source), "tracking again"):
+        for frame, results in progress(frames, length_of(replay.source), "tracking again"):
             for result in results:
                 asked = self.object in (None, result.object_id) and self.frame in (None, frame.index)
                 if asked and self._fits(result, result.object_id in seen):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from tracker.terminal import STDERR, progress
+from tracker.terminal import STDERR, hush, progress, say_json
 
 if TYPE_CHECKING:
     from eval.kept_units import KeptUnits
@@ -81,6 +81,10 @@ class Track:
     need the same code and packages, and the dataset under the same path; one thread a worker."""
     threads: int = 1
     """Threads of torch in each process: more make a vision-language backend without a GPU faster."""
+    json: bool = False
+    """Write the scores, as in scores.json, to the standard output, as a line of JSON, and no tables."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from contextlib import ExitStack
@@ -101,6 +105,7 @@ class Track:
         from tracker.errors import ConfigError
         from tracker.output import require_free, result_folder
 
+        hush(self.quiet or self.json)
         if self.view and self.out is None:
             raise ConfigError(f"--view {self.view[0]} needs a folder to write to: give --out DIR")
         if self.view and self.cluster is not None:
@@ -131,6 +136,8 @@ class Track:
                 with_vsd=self.vsd,
             )
             latency_ms = tracked.latency_ms()
+            if self.json:
+                say_json({**scores.as_json(), "latency_ms": latency_ms, "environment": environment()})
             if self.out:
                 folder = stack.enter_context(result_folder(self.out, self.overwrite))
                 extra = {"latency_ms": latency_ms, "environment": environment()}
