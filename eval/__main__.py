@@ -1,5 +1,5 @@
 """`python -m eval track` runs the tracker on a dataset and scores it, `pairs` on pairs of images, `scenarios` where it
-gets lost; `calibrate` fits its confidence; `score` scores anybody's BOP result file."""
+gets lost; `calibrate` fits its confidence; `score` scores anybody's BOP result file; `plate` makes pictures."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from eval.commands.ablate import Ablate
 from eval.commands.bench import Bench
 from eval.commands.calibrate import Calibrate
 from eval.commands.pairs import Pairs
+from eval.commands.plate import Plate
 from eval.commands.scenarios import Scenarios
 from eval.commands.score import Score
 from eval.commands.track import Track
@@ -28,6 +29,7 @@ def main() -> None:
                 "calibrate": Calibrate,
                 "ablate": Ablate,
                 "bench": Bench,
+                "plate": Plate,
             },
             prog="python -m eval",
             args=sys.argv[1:],

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from rich.table import Table
 
-from tracker.terminal import STDERR, run
+from tracker.terminal import STDERR, hush, run, say_json
 
 if TYPE_CHECKING:
     from tracker.concept import ConceptModel
@@ -81,15 +81,22 @@ class Reference:
     """Turns after which the object looks the same: auto detects them, none, or declared ones such as z:inf (any angle
     about its z axis), x:180, z:90, several joined by commas."""
     ask: Ask = field(default_factory=Ask)
-    show: Literal["none", "concepts"] = "none"
-    """concepts: write a picture of the concepts' maps beside the model (mug.concept -> mug.concepts.png)."""
+    show: Annotated[tuple[Literal["concepts", "views"], ...], tyro.conf.UseAppendAction] = ()
+    """Write pictures beside the model (mug.concept -> mug.concepts.png, mug.views.png). concepts: their maps in every
+    reference view. views: the reference views, and where on the viewing sphere they are. Once for each."""
     config: Path | None = None
     """YAML file with settings that differ from the defaults (view and cloud are used here)."""
     overwrite: bool = False
     """Replace the file if it exists."""
+    json: bool = False
+    """Write what the model is to the standard output, as a line of JSON, and no tables."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from reference.plate import write_concept_plate
+        from reference.sheet import write_png
+        from reference.view_plate import view_plate
         from reference.vocabulary import read_vocabulary
         from tracker.config import read_config
         from tracker.errors import ConfigError
@@ -97,16 +104,16 @@ class Reference:
         from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import open_source
 
+        hush(self.quiet or self.json)
         if self.views < 1:
             raise ConfigError(f"--views: at least one reference frame is needed, got {self.views}")
         if not 0 <= self.least_confidence <= 1:
             raise ConfigError(f"--least-confidence: expected a number from 0 to 1, got {self.least_confidence:g}")
         if self.vocabulary is not None and self.ask.category is not None:
             raise ConfigError("--vocabulary and --ask.category both name concepts: give one of them")
-        plate = self.out.with_suffix(".concepts.png") if self.show == "concepts" else None
-        for path in (self.out, plate):
-            if path is not None:
-                require_free(path, self.overwrite)
+        plates = {show: self.out.with_suffix(f".{show}.png") for show in self.show}
+        for path in (self.out, *plates.values()):
+            require_free(path, self.overwrite)
         config, symmetry = read_config(self.config), self._symmetry()
         labels = read_vocabulary(self.vocabulary).for_object(self.object).labels if self.vocabulary else None
         backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
@@ -114,9 +121,13 @@ class Reference:
         make = self._unposed if self.unposed else self._posed
         model = make(source, backend, config, labels, symmetry)
         model.save(self.out)
-        if plate is not None:
-            write_concept_plate(plate, model, backend)
+        if "concepts" in plates:
+            write_concept_plate(plates["concepts"], model, backend)
+        if "views" in plates:
+            write_png(plates["views"], view_plate(model))
         STDERR.print(_verdict(model, self.out))
+        if self.json:
+            say_json(_facts(model, self.out))
 
     def _posed(
         self,
@@ -157,6 +168,19 @@ class Reference:
                 "expected auto or none"
             )
         return None if self.symmetry == "auto" else parse_symmetry(self.symmetry)
+
+
+def _facts(model: ConceptModel, path: Path) -> dict[str, object]:
+    """What the verdict says, for other programs."""
+    return {
+        "model": str(path),
+        "object": model.object_id,
+        "backend": model.backend,
+        "labels": list(model.labels),
+        "diameter_m": model.diameter_m,
+        "symmetry": str(model.symmetry),
+        "notes": model.notes,
+    }
 
 
 def _verdict(model: ConceptModel, path: Path) -> Table:

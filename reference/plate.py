@@ -6,15 +6,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from reference.sheet import Picture, write_png
 from tracker.concept import ConceptModel
-from tracker.errors import OutputError
 from tracker.frame import PosedFrame
 from tracker.saliency import Query, SaliencyBackend
 from tracker.view import Float32s, ViewConfig, bounding_box, view_object
-
-Picture = npt.NDArray[np.uint8]
 
 TILE_PX, LABEL_PX, GAP_PX = 150, 20, 6
 PAPER, INK = (255, 255, 255), (30, 30, 30)
@@ -28,11 +25,7 @@ def write_concept_plate(path: Path, model: ConceptModel, backend: SaliencyBacken
     width = max((plate.shape[1] for plate in plates), default=1)
     plates = [np.pad(p, ((0, 0), (0, width - p.shape[1]), (0, 0)), constant_values=255) for p in plates]
     whole = np.concatenate(plates) if plates else np.full((1, 1, 3), 255, np.uint8)
-    encoded, data = cv2.imencode(".png", whole[:, :, ::-1])
-    try:
-        path.write_bytes(data.tobytes() if encoded else b"")
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+    write_png(path, whole)
 
 
 def _plate(frame: PosedFrame, model: ConceptModel, backend: SaliencyBackend) -> Picture:

@@ -32,13 +32,13 @@ ORDER = {
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
         "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "lockstep", "places",
-        "reviews", "track", "pipeline", "bop_rows", "pose_files", "ros_results", "output", "viewer", "terminal",
-        "__main__",
+        "reviews", "track", "pipeline", "bop_rows", "pose_files", "ros_results", "output", "saved_run", "overlay",
+        "video", "viewer", "rerun_log", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
         "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "completion", "unposed",
-        "plate", "__main__",
+        "sheet", "plate", "view_plate", "__main__",
     ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}

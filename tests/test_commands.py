@@ -235,7 +235,7 @@ def test_tracker_writes_lines_settings_and_a_video(model: Path, run: Run, tmp_pa
     said = run("tracker", SOURCE, "--model", model, "--out", tmp_path / "out", "--view", "overlay", "--prior", "off")
     assert (said.code, said.out) == (0, ""), said.err
     assert BOX in said.err
-    assert set(content(tmp_path / "out")) == {"poses.jsonl", "config.yaml", "overlay.mp4"}
+    assert set(content(tmp_path / "out")) == {"poses.jsonl", "config.yaml", "run.json", "overlay.mp4"}
     assert len((tmp_path / "out" / "poses.jsonl").read_text().splitlines()) == 6
     assert read_config(tmp_path / "out" / "config.yaml") == TrackerConfig(prior=False)
     video = cv2.VideoCapture(str(tmp_path / "out" / "overlay.mp4"))
@@ -335,6 +335,19 @@ def test_tracker_refuses_what_it_does_not_know_and_leaves_no_folder(
 def test_a_picture_without_a_folder_to_put_it_is_refused(program: str, model: Path, run: Run) -> None:
     what = (SOURCE, "--model", model) if program == "tracker" else ("track", "--dataset", SOURCE)
     assert_refused(run(program, *what, "--view", "overlay"), "--view overlay", "--out")
+
+
+def test_tracker_records_for_rerun_and_opens_no_window_without_a_display(
+    model: Path, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    what = ("tracker", SOURCE, "--model", model, "--quiet")
+    assert_refused(run(*what, "--view", "rerun"), "no display", "--rrd")
+    assert run(*what, "--rrd", tmp_path / "a.rrd") == Said(0, "", "")
+    assert (tmp_path / "a.rrd").stat().st_size > 10_000
+    assert_refused(run(*what, "--rrd", tmp_path / "a.rrd"), "a.rrd", "--overwrite")
 
 
 def test_tracker_takes_a_box_in_place_of_a_mask_and_two_of_a_kind(model: Path, run: Run) -> None:
@@ -731,3 +744,68 @@ def test_eval_calibrate_fits_to_poses_that_were_kept_and_prints_the_weights(run:
     assert_refused(run("eval", "calibrate", "--rows", path, "--json", path), "--rows and --json")
     assert_refused(run("eval", "calibrate", "--seeds", 0), "--seeds")
     assert_refused(run("eval", "calibrate", "--json", path), "poses.json", "--overwrite")
+
+
+# python -m eval plate
+
+
+def test_plates_are_made_of_a_saved_run_and_of_a_model(model: Path, run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert run("tracker", SOURCE, "--model", model, "--out", folder, "--quiet").code == 0
+    for kind, what in (("views", model), ("concepts", model), ("matches", folder)):
+        said = run("eval", "plate", kind, what, "--out", tmp_path / f"{kind}.png", "--width", 640)
+        assert (said.code, said.out) == (0, ""), said.err
+        picture = cv2.imread(str(tmp_path / f"{kind}.png"))
+        assert picture is not None
+        assert picture.shape[1] == 640 or kind == "concepts"
+    assert_refused(run("eval", "plate", "matches", folder, "--out", tmp_path / "matches.png"), "exists", "--overwrite")
+
+
+def test_a_plate_of_a_failure_is_the_first_one_in_the_run_or_of_the_frame_that_is_named(
+    model: Path, run: Run, tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    settings = tmp_path / "strict.yaml"
+    settings.write_text("accept: 0.9999")
+    what = (SOURCE, "--model", model, "--out", folder, "--quiet", "--config", settings)
+    assert run("tracker", *what).code == 0
+    assert run("eval", "plate", "failure", folder, "--frame", 2, "--quiet") == Said(0, "", "")
+    assert [path.name for path in folder.glob("*.png")] == [f"failure_{BOX}_000002.png"]
+    assert_refused(run("eval", "plate", "failure", folder, "--quiet"), "lost", "no frame")  # it was never found
+    assert_refused(run("eval", "plate", "matches", folder, "--frame", 2, "--quiet"), "tracked", "frame 2")
+    assert_refused(run("eval", "plate", "failure", folder, "--object", "cup"), "cup", BOX)
+    assert_refused(run("eval", "plate", "failure", tmp_path, "--quiet"), "run.json")
+
+
+# what they say
+
+
+def test_with_json_the_standard_output_is_json_and_nothing_else_is_said(run: Run, tmp_path: Path) -> None:
+    said = run("reference", SOURCE, "--object", BOX, "--out", tmp_path / "a.concept", "--json")
+    assert said.code == 0
+    facts = json.loads(said.out)
+    assert (facts["object"], facts["model"]) == (BOX, str(tmp_path / "a.concept"))
+    assert facts["notes"]["quality"]["points"] > 0
+    said = run("eval", "track", "--dataset", SOURCE, "--objects", BOX, "--json")
+    assert said.code == 0
+    scores = json.loads(said.out)
+    assert scores["metrics"]["pooled"]["instances"] > 0
+    assert scores["latency_ms"]["median"] > 0
+    assert "Percent" not in said.err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("reference", SOURCE, "--object", BOX, "--out", "a.concept"),
+        ("eval", "track", "--dataset", SOURCE, "--objects", BOX),
+        ("eval", "scenarios", "hand", "--seeds", 1, "--size", "160x120"),
+    ],
+)
+def test_quiet_they_say_nothing_but_what_is_wrong(
+    command: tuple[object, ...], run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = run(*command, "--quiet")
+    assert (said.code, said.out) == (0, "")
+    assert [line for line in said.err.splitlines() if "model of object" not in line and "reference" not in line] == []

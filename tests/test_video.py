@@ -1,82 +1,92 @@
-"""A video with a folder of depth: frame by frame, with the video's times, and as many of the one as of the other."""
+"""Videos: sent to ffmpeg where it is, whole and in order; what it says when it fails is told."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
-from tracker.errors import FrameError, SourceError
-from tracker.sources import length_of, open_source
-from tracker.sources.video import VideoWithDepth
+from tracker.errors import OutputError
+from tracker.video import VideoFile, h264_program
 
-K = "?K=60,61,31.5,23.5"
-
-
-def write(path: Path, frames: int, depths: int, fps: float = 29.97) -> str:
-    """`VIDEO+FOLDER`: the k-th frame is about 30 k red, the k-th depth 700 + k mm; names are numbers by value."""
-    writer = cv2.VideoWriter(str(path / "rgb.mp4"), cv2.VideoWriter.fourcc(*"mp4v"), fps, (64, 48))
-    for k in range(frames):
-        writer.write(np.full((48, 64, 3), (60, 30, 30 * k), np.uint8))
-    writer.release()
-    (path / "depth").mkdir()
-    for k in range(depths):
-        cv2.imwrite(str(path / "depth" / f"{8 + k}.png"), np.full((48, 64), 700 + k, np.uint16))
-    return f"{path}/rgb.mp4+{path}/depth/"
+STAND_IN = """#!{python}
+import sys
+if "-encoders" in sys.argv:
+    print(" V..... {encoder} some encoder")
+    sys.exit()
+{work}
+"""
+KEEPS = (
+    "open(sys.argv[-1], 'wb').write(sys.stdin.buffer.read()); open(sys.argv[-1] + '.asked', 'w').write(repr(sys.argv))"
+)
+FAILS = "sys.stdin.buffer.read(10); print('first line', file=sys.stderr); sys.exit('no space left')"
 
 
-def test_every_frame_has_its_depth_and_the_time_of_the_video(tmp_path: Path) -> None:
-    source = open_source(f"video:{write(tmp_path, 5, 5)}{K}")
-    assert isinstance(source, VideoWithDepth)
-    assert length_of(source) == 5
-    for _ in range(2):
-        frames = list(source)
-        assert [frame.index for frame in frames] == list(range(5))
-        for k, frame in enumerate(frames):
-            assert np.abs(frame.rgb.astype(int) - [30 * k, 30, 60]).max() < 8
-            assert frame.depth_m == pytest.approx((700 + k) / 1000)
-            assert frame.stamp_ns == pytest.approx(k * 1e9 / 29.97, abs=1e3)
-            assert (frame.provenance.name, frame.provenance.raw_depth_unit_m) == (str(8 + k), 0.001)
-            assert frame.intrinsics.matrix.ravel().tolist() == [60, 0, 31.5, 0, 61, 23.5, 0, 0, 1]
+@pytest.fixture(autouse=True)
+def asked_anew() -> Iterator[None]:
+    h264_program.cache_clear()
+    yield
+    h264_program.cache_clear()
 
 
-def test_the_camera_may_be_in_a_file_beside_the_video_and_the_unit_may_be_given(tmp_path: Path) -> None:
-    argument = write(tmp_path, 2, 2)
-    with pytest.raises(SourceError, match=rf"a video does not tell the camera; .* cam_K\.txt into {tmp_path}"):
-        VideoWithDepth(argument)
-    (tmp_path / "cam_K.txt").write_text("60 0 31.5 0 61 23.5 0 0 1")
-    frame = next(iter(VideoWithDepth(f"{argument}?depth_unit=0.0001")))
-    assert frame.intrinsics.fx == 60
-    assert frame.depth_m == pytest.approx(0.07)
+def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, work: str, encoder: str = "libx264") -> None:
+    """A program called ffmpeg, the only one on the PATH."""
+    folder.mkdir()
+    program = folder / "ffmpeg"
+    program.write_text(STAND_IN.format(python=sys.executable, encoder=encoder, work=work))
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder))
 
 
-@pytest.mark.parametrize(("frames", "depths"), [(5, 4), (4, 5)])
-def test_counts_that_differ_are_refused(tmp_path: Path, frames: int, depths: int) -> None:
-    argument = write(tmp_path, frames, depths)
-    with pytest.raises(SourceError, match=rf"rgb\.mp4 has {frames} frames and .*depth {depths} depth pictures"):
-        VideoWithDepth(f"{argument}{K}")
+def pictures() -> list[np.ndarray]:
+    return [np.random.default_rng(k).integers(0, 255, (31, 42, 3), np.uint8) for k in range(4)]
 
 
-def test_parts_that_are_missing_or_of_another_kind_are_named(tmp_path: Path) -> None:
-    argument = write(tmp_path, 2, 2)
-    with pytest.raises(SourceError, match=r"expected video:VIDEO\+FOLDER"):
-        VideoWithDepth(f"{tmp_path}/rgb.mp4{K}")
-    with pytest.raises(SourceError, match=r"nothing\.mp4: no such video"):
-        VideoWithDepth(f"{tmp_path}/nothing.mp4+{tmp_path}/depth{K}")
-    with pytest.raises(SourceError, match=f"{tmp_path} has no png pictures"):
-        VideoWithDepth(f"{tmp_path}/rgb.mp4+{tmp_path}{K}")
-    (tmp_path / "rgb.mp4").write_bytes(b"no video")
-    with pytest.raises(SourceError, match=r"rgb\.mp4: not a video that can be read"):
-        VideoWithDepth(f"{argument}{K}")
+def test_ffmpeg_gets_every_picture_whole_and_is_told_their_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(tmp_path / "bin", monkeypatch, KEEPS)
+    video = VideoFile(tmp_path / "a.mp4", 15)
+    for picture in pictures():
+        video.write(picture)
+    video.close()
+    assert (tmp_path / "a.mp4").read_bytes() == b"".join(picture[:30].tobytes() for picture in pictures())
+    asked = (tmp_path / "a.mp4.asked").read_text()
+    assert all(word in asked for word in ("'42x30'", "'bgr24'", "'15'", "'libx264'", "'yuv420p'"))
 
 
-def test_depth_of_another_size_or_depth_is_named(tmp_path: Path) -> None:
-    source = VideoWithDepth(f"{write(tmp_path, 2, 2)}{K}")
-    cv2.imwrite(str(tmp_path / "depth" / "9.png"), np.full((24, 32), 700, np.uint16))
-    with pytest.raises(FrameError, match=r"depth_m has shape \(24, 32\)"):
-        list(source)
-    cv2.imwrite(str(tmp_path / "depth" / "9.png"), np.full((48, 64, 3), 70, np.uint8))
-    with pytest.raises(SourceError, match="a depth picture has one channel"):
-        list(source)
+def test_an_ffmpeg_that_fails_is_an_error_with_its_last_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stand_in(tmp_path / "bin", monkeypatch, FAILS)
+    video = VideoFile(tmp_path / "a.mp4", 15)
+    video.write(pictures()[0])
+    with pytest.raises(OutputError, match=r"a\.mp4.*no space left"):
+        video.close()
+
+
+def test_an_ffmpeg_that_ends_in_the_middle_is_one_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stand_in(tmp_path / "bin", monkeypatch, FAILS)
+    video = VideoFile(tmp_path / "a.mp4", 15)
+    large = np.zeros((1000, 2000, 3), np.uint8)  # more than a pipe holds
+    with pytest.raises(OutputError, match=r"a\.mp4.*no space left"):
+        video.write(large)
+    video.close()
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_without_h264_the_video_is_another_one_and_that_is_said_once(
+    there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    if there:
+        stand_in(tmp_path / "bin", monkeypatch, FAILS, encoder="mpeg4")
+    for name in ("a.mp4", "b.mp4"):
+        video = VideoFile(tmp_path / name, 15)
+        for picture in pictures():
+            video.write(picture)
+        video.close()
+        assert b"mp4v" in (tmp_path / name).read_bytes()
+    assert len(caplog.messages) == 1
+    assert ("libx264" if there else "program ffmpeg") in caplog.text

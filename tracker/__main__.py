@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from rich.table import Table
 
-from tracker.terminal import STDERR, progress, run
+from tracker.terminal import ALWAYS, STDERR, hush, progress, run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from tracker.concept import ConceptModel
     from tracker.config import TrackerConfig
     from tracker.pointing import Pointer
+    from tracker.result import TrackResult
     from tracker.sources import FrameSource
+    from tracker.viewer import Viewer
 
 
 @dataclass
@@ -34,7 +36,8 @@ class Track:
     """Concept model that python -m reference made; once for every object. Of two of a kind, the same file twice: the
     second one is called NAME_2."""
     out: Path | None = None
-    """Folder for poses.jsonl (a line a frame and object), config.yaml and what --view and --write make."""
+    """Folder for poses.jsonl (a line a frame and object), config.yaml, run.json (what else it takes to do this again,
+    as python -m eval plate does) and what --view and --write make."""
     write: tuple[Literal["ob-in-cam", "tum", "bop"], ...] = ()
     """Poses in these formats too: ob-in-cam (FoundationPose: ob_in_cam/NAME.txt, a 4x4 matrix a frame; a folder an
     object where there are several), tum (tum/OBJECT.txt, a trajectory for evo), bop (results.csv)."""
@@ -60,12 +63,16 @@ class Track:
     """YAML file with settings that differ from the defaults."""
     smooth: Literal["off", "offline"] = "off"
     """offline: every pose by all frames of the recording, also those after it; the lines are written at the end."""
-    view: Literal["none", "overlay"] = "none"
-    """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed."""
+    view: Annotated[tuple[Literal["overlay", "frames", "rerun"], ...], tyro.conf.UseAppendAction] = ()
+    """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed; H.264 where the
+    program ffmpeg is installed. frames: write a PNG a frame to its folder frames. rerun: open a window of
+    Rerun's (extra rerun) with all that is seen and said. Once for each."""
+    rrd: Path | None = None
+    """Write what --view rerun shows to this file (.rrd), to be opened anywhere (extra rerun)."""
     record: Path | None = None
     """Write what the camera sees to this file (.db3) while it is tracked."""
     overwrite: bool = False
-    """Replace results that are in the --out folder, and the --record file."""
+    """Replace results that are in the --out folder, and the --record and --rrd files."""
     json: bool = False
     """Write the lines of poses.jsonl to the standard output as they come."""
     quiet: bool = False
@@ -85,9 +92,10 @@ class Track:
         from tracker.pose_files import open_pose_files
         from tracker.ros_results import PosePublisher
         from tracker.saliency import BackendOptions, open_backend
+        from tracker.saved_run import SavedRun
         from tracker.sources import LiveSource, RosSource, length_of
-        from tracker.viewer import NullViewer, OverlayVideo
 
+        hush(self.quiet or self.json)
         config = self._config()
         if not self.model:
             raise ConfigError("--model: at least one concept model is needed; python -m reference makes one")
@@ -105,12 +113,13 @@ class Track:
             for object_id, there in pointed_out.items():
                 tracker.point_out(object_id, there)
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
-            viewer = OverlayVideo(folder / "overlay.mp4", models) if folder and self.view == "overlay" else NullViewer()
+            viewer = self._viewer(folder, models)
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
+                SavedRun(self.source, tuple(map(str, self.model)), self.weights, self.device, self.at).save(folder)
             coming = stack.enter_context(live) if live else source
-            shown = coming if self.quiet or self.json else progress(coming, length_of(source), "tracking")
+            shown = progress(coming, length_of(source), "tracking", summary.now)
             frames = InOrder(shown, live=live is not None)
             texts = [sys.stdout] if self.json else []
             if folder:
@@ -126,28 +135,27 @@ class Track:
                     results = tracker.step(frame if config.masks == "given" else first_masks(frame))
                     viewer.show(frame, results, {})
                     for result in results:
-                        summary.add(result.object_id, result.state.value, result.timings_ms["total"])
+                        summary.add(result)
                     for output in outputs:
                         output.add(frame, results)
                     if live:
                         summary.latencies_ms.append(live.latency_ms())
             except KeyboardInterrupt:
-                STDERR.print("stopped; what was tracked is kept")
+                ALWAYS.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error
             for output in outputs:
                 output.finish()
         if frames.refused:
-            STDERR.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
+            ALWAYS.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
         for what, count in live.left_out.items() if live else ():
             if count:
-                STDERR.print(f"{count} frames {what}")
+                ALWAYS.print(f"{count} frames {what}")
         if tracker.frames_without_concepts:
-            STDERR.print(f"{tracker.frames_without_concepts} frames went without concepts that were asked for")
+            ALWAYS.print(f"{tracker.frames_without_concepts} frames went without concepts that were asked for")
         if failure:
             raise failure
-        if not self.quiet and not self.json:
-            STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
+        STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
 
     def _pointers(self, models: Sequence[ConceptModel]) -> Iterator[tuple[str, Pointer]]:
         """Raises ConfigError where it is not clear which object is meant, or where it is."""
@@ -160,6 +168,19 @@ class Track:
                 known = ", ".join(model.object_id for model in models)
                 raise ConfigError(f"--at {text}: of which object? Write NAME={text}, NAME one of {known}")
             yield name if separator else models[0].object_id, parse_pointer(there)
+
+    def _viewer(self, folder: Path | None, models: Sequence[ConceptModel]) -> Viewer:
+        """Raises as `RerunLog` does, and OutputError where its file is there already."""
+        from tracker.output import require_free
+        from tracker.rerun_log import RerunLog
+        from tracker.viewer import Several, overlay_viewer
+
+        drawn, window = overlay_viewer(self.view, folder, models), "rerun" in self.view
+        if not window and self.rrd is None:
+            return drawn
+        if self.rrd is not None:
+            require_free(self.rrd, self.overwrite)
+        return Several((drawn, RerunLog(models, self.rrd, window=window)))
 
     def _opened_source(self) -> FrameSource:
         """Raises SourceError and OutputError, also where it cannot be recorded as it is asked for."""
@@ -179,8 +200,9 @@ class Track:
         from tracker.errors import ConfigError
         from tracker.sources import WITHOUT_MASKS, kind_of
 
-        if self.view != "none" and self.out is None:
-            raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
+        for view in self.view:
+            if view != "rerun" and self.out is None:
+                raise ConfigError(f"--view {view} needs a folder to write to: give --out DIR")
         if self.write and self.out is None:
             raise ConfigError(f"--write {' '.join(self.write)} needs a folder to write to: give --out DIR")
         config = read_config(self.config)
@@ -205,10 +227,17 @@ class _Summary:
     states: Counter[tuple[str, str]] = field(default_factory=Counter)
     times_ms: dict[str, list[float]] = field(default_factory=dict)
     latencies_ms: list[float] = field(default_factory=list)
+    last: dict[str, str] = field(default_factory=dict)
 
-    def add(self, object_id: str, state: str, total_ms: float) -> None:
+    def add(self, result: TrackResult) -> None:
+        object_id, state = result.object_id, result.state.value
         self.states[object_id, state] += 1
-        self.times_ms.setdefault(object_id, []).append(total_ms)
+        self.times_ms.setdefault(object_id, []).append(result.timings_ms["total"])
+        self.last[object_id] = state
+
+    def now(self) -> str:
+        """How many objects are in which state."""
+        return ", ".join(f"{count} {state}" for state, count in Counter(self.last.values()).items())
 
     def table(self, since: str) -> Table:
         """since: what the latency is counted from."""

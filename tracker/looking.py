@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeGuard, TypeVar
@@ -18,6 +19,7 @@ from tracker.stopwatch import Stopwatch
 from tracker.view import ObjectView, view_object
 
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
+MOST_TRIED = 64  # poses that are remembered
 STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
 
 T = TypeVar("T")
@@ -42,26 +44,39 @@ class Look:
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """A pose, and what speaks for it. masked: by pixels that are known to be the object's. missed: why it did not even
-    show at the first place where it was looked for; empty where something did."""
+    show at the first place where it was looked for; empty where something did. saliency: what concepts said there, None
+    where surface and colours were enough."""
 
     hypothesis: Hypothesis
     grounds: Grounds
     confidence: float
     masked: bool
     missed: str = ""
+    saliency: Saliency | None = None
 
     @property
     def score(self) -> float:
         return self.hypothesis.evidence.score
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Attempt:
+    """How one object was looked for in a frame. looks: where, one after the other, or why nowhere. tried: the poses
+    that were found and judged, there and in the whole picture."""
+
+    looks: tuple[Look | str, ...]
+    tried: tuple[Found, ...]
+
+
 def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeGuard[Found]:
     """A pose has to be likely. Where nobody says which pixels are the object's, less is asked where it was expected
-    while it is followed than of what is seen again or has jumped, so that a state does not flicker."""
+    while it is followed than of what is seen again or has jumped, so that a state does not flicker; and most where
+    nothing was expected."""
     if isinstance(found, str) or found.hypothesis.evidence.surface < LEAST_SURFACE:
         return False
-    goes_on = found.masked or (followed and found.hypothesis.origin != "search")
-    return found.confidence >= (config.believe if goes_on else config.regain)
+    if found.masked or (followed and found.hypothesis.origin != "search"):
+        return found.confidence >= config.believe
+    return found.confidence >= (config.sure if found.grounds.turn_rad is None else config.regain)
 
 
 def why_not(found: Found | str) -> str:
@@ -76,7 +91,8 @@ def why_not(found: Found | str) -> str:
 
 
 class Looking:
-    """For one model. waiting: whether it did without concepts that it asked for, since somebody set that to False."""
+    """For one model. waiting: whether it did without concepts that it asked for, since somebody set that to False.
+    tried: what was found lately, believed or not, since somebody cleared it."""
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
@@ -84,6 +100,7 @@ class Looking:
         self._without_concepts = 0  # looks in a row that did without
         self._usual = 0.0  # score of what was believed last
         self.waiting = False
+        self.tried: deque[Found] = deque(maxlen=MOST_TRIED)
 
     def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
         """The likeliest of what the looks find, no further than the first that leaves no doubt; or why there is
@@ -141,7 +158,8 @@ class Looking:
             best = self._likeliest(best, self._search.anywhere(sight, cloud, clock), look)
         if best is None:
             return "poor fit: no pose explains what is seen"
-        return self._likeliest(best, self._search.turned(best.hypothesis, sight, clock), look) or best
+        best = self._likeliest(best, self._search.turned(best.hypothesis, sight, clock), look) or best
+        return replace(best, saliency=saliency)
 
     def _continued(self, look: Look, sight: Sight, clock: Stopwatch) -> Found | None:
         hypothesis = None if look.start is None else self._search.continued(look.start, sight, clock)
@@ -167,7 +185,9 @@ class Looking:
 
     def _found(self, hypothesis: Hypothesis, look: Look) -> Found:
         grounds = self._grounds(hypothesis, look.expected)
-        return Found(hypothesis, grounds, confidence(grounds), look.masked)
+        found = Found(hypothesis, grounds, confidence(grounds), look.masked)
+        self.tried.append(found)
+        return found
 
     def _grounds(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> Grounds:
         refined, symmetry = hypothesis.refined, self._model.symmetry

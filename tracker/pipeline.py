@@ -13,6 +13,7 @@ from tracker.errors import ConfigError, FrameError, LateFrameError
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.lockstep import lockstep
+from tracker.looking import Attempt
 from tracker.places import Moment
 from tracker.pointing import Pointer
 from tracker.result import TrackResult
@@ -120,6 +121,11 @@ class ObjectTracker:
         if self._reviews:
             self._review(self._reviews, moments)
         return tuple(results)
+
+    def attempt(self, object_id: str) -> Attempt:
+        """How an object was looked for in the last frame, to see why it was not found. Raises ConfigError where there
+        is no model of it."""
+        return self._track_of(object_id).attempt
 
     @property
     def frames_without_concepts(self) -> int:

@@ -14,6 +14,7 @@ from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.pose_filter import FilterStep
 from tracker.projection import nearest_pixels, project
 from tracker.region import Region, SeenRegion
+from tracker.saliency import Saliency
 from tracker.verification import Evidence
 from tracker.view import Float32s
 
@@ -30,11 +31,13 @@ class TrackState(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """What a frame measured of an object: its own pixels' depth (h, w), metres, 0 elsewhere, and their camera."""
+    """What a frame measured of an object: its own pixels' depth (h, w), metres, 0 elsewhere, and their camera.
+    saliency: the concepts there, None where they were not asked."""
 
     model: ConceptModel
     depth_m: Float32s
     camera: Intrinsics
+    saliency: Saliency | None = None
 
     def share_seen(self, points_cam: Floats, weights: Floats) -> float:
         """Share of points (N, 3), by weight (N,), that lie on the measured surface."""

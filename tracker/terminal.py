@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -13,39 +14,55 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from tracker.errors import TrackerError
 
-STDERR = Console(stderr=True)
+STDERR, ALWAYS = Console(stderr=True), Console(stderr=True)  # ALWAYS is heard where a program is to be quiet
 Item = TypeVar("Item")
 
 
 def run(program: Callable[[], None]) -> None:
     """Run a command to its end. A TrackerError is told in a sentence, exit code 1; ctrl-C gives 130."""
-    handler = RichHandler(console=STDERR, show_path=False, show_time=False)
+    STDERR.quiet = False
+    handler = RichHandler(console=ALWAYS, show_path=False, show_time=False)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     try:
         program()
     except TrackerError as error:
-        STDERR.print(f"[bold red]error:[/] {_plain(str(error))}", highlight=False, soft_wrap=True)
+        ALWAYS.print(f"[bold red]error:[/] {_plain(str(error))}", highlight=False, soft_wrap=True)
         sys.exit(1)
     except KeyboardInterrupt:
-        STDERR.print("stopped")
+        ALWAYS.print("stopped")
         sys.exit(130)
 
 
-def progress(items: Iterable[Item], total: int | None, what: str) -> Iterator[Item]:
-    """The items, with a bar on the terminal that tells how many of them are done, how fast, and how long it takes."""
+def hush(quiet: bool) -> None:
+    """If that is wanted, from now on until the program has run nothing but warnings and errors: no bars, no tables."""
+    STDERR.quiet = quiet
+
+
+def say_json(content: object) -> None:
+    """A line of JSON on the standard output, for other programs."""
+    sys.stdout.write(json.dumps(content, allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def progress(
+    items: Iterable[Item], total: int | None, what: str, told: Callable[[], str] = lambda: ""
+) -> Iterator[Item]:
+    """The items, with a bar on the terminal that tells how many of them are done, how fast, how long it takes, and
+    whatever is told after each."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[rate]}"),
         TimeRemainingColumn(),
+        TextColumn("{task.fields[told]}", markup=False),
     )
-    with Progress(*columns, console=STDERR, transient=True, disable=not STDERR.is_terminal) as bar:
-        task = bar.add_task(what, total=total, rate="")
+    with Progress(*columns, console=STDERR, transient=True, disable=not STDERR.is_terminal or STDERR.quiet) as bar:
+        task = bar.add_task(what, total=total, rate="", told="")
         for item in items:
             yield item
             speed = bar.tasks[0].speed
-            bar.update(task, advance=1, rate=f"{speed:.1f}/s" if speed else "")
+            bar.update(task, advance=1, rate=f"{speed:.1f}/s" if speed else "", told=told())
 
 
 def _plain(text: str) -> str:

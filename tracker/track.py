@@ -13,7 +13,7 @@ from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import Mask
 from tracker.geometry import Pose
-from tracker.looking import Asking, Found, Look, Looking, believed, why_not
+from tracker.looking import Asking, Attempt, Found, Look, Looking, believed, why_not
 from tracker.places import Moment, Places
 from tracker.pointing import Pointer
 from tracker.pose_filter import PoseFilter
@@ -49,6 +49,11 @@ class Track:
         return self._model.object_id
 
     @property
+    def attempt(self) -> Attempt:
+        """Of the last frame."""
+        return Attempt(tuple(self._looked), tuple(self._look.tried))
+
+    @property
     def labels(self) -> tuple[str, ...]:
         return self._model.labels
 
@@ -72,6 +77,7 @@ class Track:
     def step(self, now: Moment) -> Asking[TrackResult]:
         predicted = self._filter.predict(now.frame.stamp_ns) if self._config.prior else None
         self._look.waiting, self._looked = False, []
+        self._look.tried.clear()
 
         # 1. Is it where it is said, or expected, to be?
         looks = self._places.looks(now, predicted, self._followed, self._look)
@@ -169,7 +175,9 @@ class Track:
             raw_pose=raw,
             grounds=found.grounds,
             timings_ms=now.clock.timings_ms(),
-            surface=Surface(self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera),
+            surface=Surface(
+                self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera, found.saliency
+            ),
             mask=view.mask,
             step=filtered.step,
         )

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import tyro
 from rich.table import Table
 
-from tracker.terminal import STDERR, progress
+from tracker.terminal import STDERR, hush, progress
 
 STILL, MOVING = "still", "turn?object=tea_box"
 SYMMETRIC = {"bowl": "z:inf", "soup_can": "z:inf"}  # of their shapes: the can's print is declared to be nothing
@@ -28,11 +28,14 @@ class FilterBench:
     """File for the figures."""
     overwrite: bool = False
     """Replace the file if it exists."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from eval.environment import write_figures
         from tracker.output import require_free
 
+        hush(self.quiet)
         if self.json:
             require_free(self.json, self.overwrite)
         figures = self.measured()

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import tyro
 from rich.table import Table
 
-from tracker.terminal import STDERR
+from tracker.terminal import STDERR, hush
 
 
 @dataclass
@@ -37,12 +37,15 @@ class SaliencyBench:
     """File for the figures."""
     overwrite: bool = False
     """Replace the file if it exists."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from eval.bench.random_network import save_random_siglip
         from eval.environment import write_figures
         from tracker.output import require_free
 
+        hush(self.quiet)
         if self.json:
             require_free(self.json, self.overwrite)
         temporary = tempfile.TemporaryDirectory() if self.keep_weights is None else nullcontext(self.keep_weights)

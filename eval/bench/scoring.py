@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 from rich.table import Table
 
-from tracker.terminal import STDERR, progress
+from tracker.terminal import STDERR, hush, progress
 
 if TYPE_CHECKING:
     from eval.datasets import ObjectModel
@@ -33,11 +33,14 @@ class ScoringBench:
     """File for the figures."""
     overwrite: bool = False
     """Replace the file if it exists."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from eval.environment import write_figures
         from tracker.output import require_free
 
+        hush(self.quiet)
         if self.json:
             require_free(self.json, self.overwrite)
         figures = self.measured()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from tracker.terminal import STDERR, progress
+from tracker.terminal import ALWAYS, STDERR, hush, progress
 
 if TYPE_CHECKING:
     from eval.preset import Preset
@@ -52,14 +52,17 @@ class Ablate:
     """dask://HOST:PORT or ray://HOST:PORT, as for eval track."""
     threads: int = 1
     """Threads of torch in each process."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from eval.preset import preset_path, read_preset, shipped_presets
         from tracker.errors import ConfigError
 
+        hush(self.quiet)
         if self.list_presets:
             for name in shipped_presets():
-                STDERR.print(f"{name}: {read_preset(name).title}", highlight=False)
+                ALWAYS.print(f"{name}: {read_preset(name).title}", highlight=False)
             return
         if self.preset is None or not self.dataset or self.out is None:
             raise ConfigError("eval ablate needs a PRESET (--list has them), --dataset and --out DIR")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from tracker.terminal import STDERR, progress
+from tracker.terminal import STDERR, hush, progress
 
 if TYPE_CHECKING:
     from eval.calibration.rows import JudgedPose
@@ -33,6 +33,8 @@ class Calibrate:
     """Replace the file if it exists."""
     jobs: int = 1
     """Processes that run side by side; -1 is one a core."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from eval.calibration.cross_validation import held_out_chances, judge, judge_by_scene
@@ -43,6 +45,7 @@ class Calibrate:
         from tracker.errors import ConfigError
         from tracker.output import require_free
 
+        hush(self.quiet)
         if self.rows and self.json:
             raise ConfigError("--rows and --json: what was read from a file is not written again")
         if self.seeds < 1 or self.first_seed < 0:

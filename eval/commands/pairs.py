@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from tracker.terminal import STDERR, progress
+from tracker.terminal import STDERR, hush, progress, say_json
 
 if TYPE_CHECKING:
     from eval.datasets import Dataset
@@ -59,6 +59,10 @@ class Pairs:
     """Folder for pairs.csv, poses.jsonl, results.csv, scores.json, report.html and config.yaml."""
     overwrite: bool = False
     """Replace results that are in the --out folder."""
+    json: bool = False
+    """Write the scores, as in scores.json, to the standard output, as a line of JSON, and no tables."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from collections import Counter
@@ -81,6 +85,7 @@ class Pairs:
         from tracker.saliency import BackendOptions, open_backend
 
         vocabularies = read_vocabulary(self.vocabulary) if self.vocabulary else None
+        hush(self.quiet or self.json)
         backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
         one_shot = OneShot(backend, read_config(self.config), vocabularies, self.method)
         dataset = open_dataset(self.dataset)
@@ -104,6 +109,8 @@ class Pairs:
             scores = score_pairs(dataset, pairs, answered.answers, protocol, self.symmetric, self.vsd)
             timings = [answer.timings_ms for answer in answered.answers if answer.timings_ms]
             latency_ms = Tracked(timings_ms=timings).latency_ms()
+            if self.json:
+                say_json({**scores.as_json(), "latency_ms": latency_ms, "environment": environment()})
             if folder:
                 extra = {"latency_ms": latency_ms, "environment": environment()}
                 write_pairs(folder / "pairs.csv", pairs, dataset)

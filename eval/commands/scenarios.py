@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from tracker.terminal import STDERR, progress
+from tracker.terminal import STDERR, hush, progress
 
 if TYPE_CHECKING:
     from eval.scenarios.run import ScenarioRun
@@ -37,6 +37,8 @@ class Scenarios:
     """Replace the file if it exists."""
     jobs: int = 1
     """Processes that run side by side; -1 is one a core."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from eval.scenarios.confidence import confidence_quality
@@ -46,6 +48,7 @@ class Scenarios:
         from eval.spread import Spreading, spread
         from tracker.output import require_free
 
+        hush(self.quiet)
         if self.json:
             require_free(self.json, self.overwrite)
         spreading, runs = Spreading(self.jobs), self._runs()

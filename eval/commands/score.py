@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from tracker.terminal import STDERR
+from tracker.terminal import STDERR, hush, say_json
 
 
 @dataclass
@@ -38,6 +38,10 @@ class Score:
     """Score the frames of the alignment too."""
     overwrite: bool = False
     """Replace the file if it exists."""
+    json: bool = False
+    """Write the scores, as in --out, to the standard output, as a line of JSON, and no tables."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
 
     def __call__(self) -> None:
         from eval.bop_results import read_results
@@ -51,6 +55,7 @@ class Score:
         from tracker.errors import ConfigError
         from tracker.output import require_free
 
+        hush(self.quiet or self.json)
         if self.align == "none" and (self.score_align_frames or self.align_frame != "first"):
             raise ConfigError("--align-frame and --score-align-frames are of use with --align reference only")
         if self.out:
@@ -67,6 +72,8 @@ class Score:
             align_on=None if self.align == "none" else self.align_frame,
             keep_alignment_frames=self.score_align_frames,
         )
+        if self.json:
+            say_json({**scores.as_json(), "environment": environment()})
         if self.out:
             self.out.parent.mkdir(parents=True, exist_ok=True)
             extra = {"environment": environment()}
