@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections import Counter
 from contextlib import ExitStack
@@ -19,8 +20,11 @@ if TYPE_CHECKING:
 
     from tracker.concept import ConceptModel
     from tracker.config import TrackerConfig
+    from tracker.pipeline import ObjectTracker
     from tracker.pointing import Pointer
+    from tracker.remote_control import RemoteControl
     from tracker.sources import FrameSource
+    from tracker.web.server import WebPage
 
 
 @dataclass
@@ -58,6 +62,9 @@ class Track:
     """offline: every pose by all frames of the recording, also those after it; the lines are written at the end."""
     view: Literal["none", "overlay"] = "none"
     """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed."""
+    serve: Annotated[str | None, tyro.conf.arg(metavar="[HOST:]PORT")] = None
+    """Show all of it live on a page at http://HOST:PORT (this machine alone where there is no HOST); objects can be
+    pointed out there, and the last 30 s saved. Other machines need the token that is printed, or CONCEPTRACK_TOKEN."""
     record: Path | None = None
     """Write what the camera sees to this file (.db3) while it is tracked."""
     overwrite: bool = False
@@ -78,9 +85,10 @@ class Track:
         from tracker.latest import Latest
         from tracker.output import PoseLines, result_folder
         from tracker.pipeline import ObjectTracker
+        from tracker.remote_control import RemoteControl
         from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import LiveSource, length_of
-        from tracker.viewer import NullViewer, OverlayVideo
+        from tracker.viewer import OverlayVideo, Viewer, Viewers
 
         config = self._config()
         if not self.model:
@@ -98,8 +106,15 @@ class Track:
             tracker = ObjectTracker(models, config, backend, worker)
             for object_id, there in pointed_out.items():
                 tracker.point_out(object_id, there)
+            remote, viewers = RemoteControl(), list[Viewer]()
+            page = self._page(tracker, models, config, remote)
+            if page:
+                stack.callback(page.close)
+                viewers.append(page)
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
-            viewer = OverlayVideo(folder / "overlay.mp4", models) if folder and self.view == "overlay" else NullViewer()
+            if folder and self.view == "overlay":
+                viewers.append(OverlayVideo(folder / "overlay.mp4", models))
+            viewer = Viewers(viewers)
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
@@ -119,6 +134,10 @@ class Track:
                         lines.add(frame.index, result)
                     if live:
                         summary.latencies_ms.append(live.latency_ms())
+                    remote.carry_out(tracker)
+                if page:
+                    STDERR.print("there are no more frames; the page stays until ctrl-C")
+                    page.stay("there are no more frames")
             except KeyboardInterrupt:
                 STDERR.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
@@ -147,6 +166,18 @@ class Track:
                 known = ", ".join(model.object_id for model in models)
                 raise ConfigError(f"--at {text}: of which object? Write NAME={text}, NAME one of {known}")
             yield name if separator else models[0].object_id, parse_pointer(there)
+
+    def _page(
+        self, tracker: ObjectTracker, models: Sequence[ConceptModel], config: TrackerConfig, remote: RemoteControl
+    ) -> WebPage | None:
+        """The page that is served, its link printed; None where none is asked for. Raises as `open_page` does."""
+        if self.serve is None:
+            return None
+        from tracker.web import TOKEN_VARIABLE, open_page
+
+        opened = open_page(self.serve, os.environ.get(TOKEN_VARIABLE), tracker, models, config, remote)
+        STDERR.print(f"the page: {opened.link}", highlight=False, soft_wrap=True, markup=False)
+        return opened.page
 
     def _opened_source(self) -> FrameSource:
         """Raises SourceError and OutputError, also where it cannot be recorded as it is asked for."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Protocol
 
@@ -41,6 +42,22 @@ class NullViewer:
 
     def close(self) -> None:
         pass
+
+
+class Viewers:
+    """Several as one; none shows nothing."""
+
+    def __init__(self, viewers: Sequence[Viewer]) -> None:
+        self._viewers = tuple(viewers)
+
+    def show(self, frame: Frame, results: Sequence[TrackResult], truth: Mapping[str, Pose]) -> None:
+        for viewer in self._viewers:
+            viewer.show(frame, results, truth)
+
+    def close(self) -> None:
+        with ExitStack() as stack:  # each of them, whatever another raises
+            for viewer in reversed(self._viewers):
+                stack.callback(viewer.close)
 
 
 class OverlayVideo:
