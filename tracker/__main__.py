@@ -175,7 +175,8 @@ class Track:
             return None
         from tracker.web import TOKEN_VARIABLE, open_page
 
-        opened = open_page(self.serve, os.environ.get(TOKEN_VARIABLE), tracker, models, config, remote)
+        token = os.environ.get(TOKEN_VARIABLE)
+        opened = open_page(self.serve, token, self.source, tracker, models, config, remote)
         STDERR.print(f"the page: {opened.link}", highlight=False, soft_wrap=True, markup=False)
         return opened.page
 

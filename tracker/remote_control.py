@@ -64,6 +64,9 @@ class RemoteControl:
                 tracker.point_out(object_id, there)
             except TrackerError as error:  # it is the asker's, the loop goes on
                 told.set_exception(error)
+            except BaseException as error:
+                told.set_exception(error)
+                raise
             else:
                 told.set_result(None)
 

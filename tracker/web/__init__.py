@@ -42,13 +42,14 @@ class OpenedPage:
 def open_page(
     address: str,
     token: str | None,
+    title: str,
     tracker: ObjectTracker,
     models: Sequence[ConceptModel],
     config: TrackerConfig,
     remote: RemoteControl,
 ) -> OpenedPage:
     """address: HOST:PORT or PORT. token: who has it may see the page; None makes one where others than this machine
-    could call it. remote: what the page asks of the loop.
+    could call it. title: the name of the source. remote: what the page asks of the loop.
 
     Raises MissingExtraError without aiohttp, ConfigError for an address or a token that cannot be meant, OutputError
     where the port is taken.
@@ -62,7 +63,8 @@ def open_page(
     except ImportError as error:
         raise MissingExtraError(f"the page needs aiohttp ({error}): pip install 'conceptrack[web]'") from error
     gate = gate_of(parse_address(address), token)
+    cannot_point = "" if config.masks == "carried" else CANNOT_POINT
     boxes = {model.object_id: box_corners(model.points) for model in models}
-    page = WebPage(gate, boxes, remote, tracker.last_answer, "" if config.masks == "carried" else CANNOT_POINT)
+    page = WebPage(gate, title, boxes, remote, tracker.last_answer, cannot_point)
     made_here = gate.token if token is None else None
     return OpenedPage(page, f"{page.url}?token={made_here}" if made_here else page.url)

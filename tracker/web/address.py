@@ -72,7 +72,7 @@ def parse_address(text: str) -> Address:
     host = host if separator else LOOPBACK
     if host.startswith("[") and host.endswith("]") and _is_ip(host[1:-1]):
         host = host[1:-1]
-    elif ":" in host:  # an IPv6 address has brackets
+    elif ":" in host or "[" in host:  # an IPv6 address has brackets, a name has none
         host = ""
     if not host or not port.isdecimal() or not port.isascii() or int(port) > 65535:
         raise ConfigError(f"--serve {text}: expected HOST:PORT, [IPv6]:PORT or PORT, as in 127.0.0.1:8080")
@@ -94,10 +94,10 @@ def listen(address: Address) -> socket.socket:
     try:
         family, _, _, _, place = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM)[0]
         return socket.create_server(place[:2], family=family)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:  # the latter of a host that can be no name
+        why = str(getattr(error, "strerror", error)).partition(" (while")[0]
         raise OutputError(
-            f"--serve {address}: cannot listen there ({error.strerror}); give another port or host, or port 0 for any "
-            "that is free"
+            f"--serve {address}: cannot listen there ({why}); give another port or host, or port 0 for any that is free"
         ) from error
 
 

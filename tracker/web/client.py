@@ -86,7 +86,6 @@ class Client:
         camera = shown.frame.intrinsics
         header = {
             "frame": shown.frame.index,
-            "source": shown.frame.provenance.source,
             "size": [camera.width, camera.height],
             "age_ms": round((time.monotonic() - shown.put_s) * 1e3, 1),
             "rate_hz": round(self._board.rate_hz(), 1),

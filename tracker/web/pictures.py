@@ -47,7 +47,7 @@ def concept_picture(view: ObjectView, saliency: Saliency, label: str) -> bytes:
     gray = cv2.cvtColor(np.ascontiguousarray(view.frame.rgb[part]), cv2.COLOR_RGB2GRAY)[:, :, None]
     heat = _heat(levels)
     inside = view.mask[part][:, :, None]
-    picture = np.where(inside, 0.3 * gray + 0.7 * heat, 0.5 * gray + 64).astype(np.uint8)
+    picture = np.where(inside, 0.15 * gray + 0.85 * heat, 0.5 * gray + 64).astype(np.uint8)
     scale = max(1, round(LEAST_PX / max(picture.shape[:2])))
     return as_jpeg(picture.repeat(scale, axis=0).repeat(scale, axis=1))
 

@@ -38,15 +38,22 @@ SHUTDOWN_S, PATIENCE_S = 1.0, 10.0
 class WebPage:
     """A viewer in the browser, served from its making until `close`.
 
-    gate: where, and for whom. boxes: object id -> corners (8, 3) as of `tracker.viewer.box_corners`. last_answer: of
-    an object, what `ObjectTracker.last_answer` says. cannot_point: why no object can be pointed out, "" where they can.
+    gate: where, and for whom. title: what is tracked in, as the user wrote it. boxes: object id -> corners (8, 3) as of
+    `tracker.viewer.box_corners`. last_answer: of an object, what `ObjectTracker.last_answer` says. cannot_point: why no
+    object can be pointed out, "" where they can.
     Raises OutputError where the address is not free.
     """
 
     def __init__(
-        self, gate: Gate, boxes: Mapping[str, Floats], remote: RemoteControl, last_answer: LastAnswer, cannot_point: str
+        self,
+        gate: Gate,
+        title: str,
+        boxes: Mapping[str, Floats],
+        remote: RemoteControl,
+        last_answer: LastAnswer,
+        cannot_point: str = "",
     ) -> None:
-        self._gate, self._boxes, self._remote = gate, boxes, remote
+        self._gate, self._title, self._boxes, self._remote = gate, title, boxes, remote
         self._last_answer, self._cannot_point = last_answer, cannot_point
         self._listening = listen(gate.address)
         self._port = int(self._listening.getsockname()[1])
@@ -186,6 +193,7 @@ class WebPage:
         answers = {object_id: self._last_answer(object_id) for object_id in self._boxes}
         return {
             "status": "ended" if self._remote.ended else "paused" if self._remote.paused else "running",
+            "title": self._title,
             "objects": list(self._boxes),
             "cannot_point": self._cannot_point,
             "recording_s": int(extent.seconds),
