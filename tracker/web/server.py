@@ -142,12 +142,13 @@ class WebPage:
         if len(self._clients) >= MOST_BROWSERS:
             return web.Response(status=503, text=f"{MOST_BROWSERS} browsers are connected already\n")
         socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MOST_BYTES)
-        await socket.prepare(request)
         client = Client(socket, self._board, self._remote, self._overlay, self._status)
-        self._clients[client] = socket
+        self._clients[client] = socket  # before anything is waited for, so that there are never too many
         self._board.listener = self._frame_came
-        showing = asyncio.create_task(self._show(client, socket))
+        showing: asyncio.Task[None] | None = None
         try:
+            await socket.prepare(request)
+            showing = asyncio.create_task(self._show(client, socket))
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
                     client.hear(message.data)
@@ -161,7 +162,8 @@ class WebPage:
             if not self._clients:
                 self._board.listener = None
             client.close()
-            showing.cancel()
+            if showing is not None:
+                showing.cancel()
         return socket
 
     async def _show(self, client: Client, socket: WebSocketResponse) -> None:
