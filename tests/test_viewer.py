@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import cv2
@@ -15,7 +15,7 @@ from tracker.errors import OutputError
 from tracker.frame import Frame
 from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.result import TrackResult, TrackState
-from tracker.viewer import EDGES, ESTIMATE, TRUTH, NullViewer, OverlayVideo, Picture, box_corners, draw_overlay
+from tracker.viewer import EDGES, ESTIMATE, TRUTH, NullViewer, OverlayVideo, Picture, Viewers, box_corners, draw_overlay
 
 CAMERA = Intrinsics(300.0, 310.0, 158.0, 121.5, 320, 240)
 TEXT_ROWS = 30
@@ -195,3 +195,29 @@ def test_no_viewer_is_a_viewer() -> None:
     viewer = NullViewer()
     viewer.show(plain(), [result(T_CAM_OBJ)], {})
     viewer.close()
+
+
+class Noting:
+    """Takes down what it is told, and cannot be closed when it is told so."""
+
+    def __init__(self, told: list[str], name: str, fails: bool = False) -> None:
+        self._told, self._name, self._fails = told, name, fails
+
+    def show(self, frame: Frame, results: Sequence[TrackResult], truth: Mapping[str, Pose]) -> None:
+        self._told.append(f"{self._name} {frame.index} {len(results)} {len(truth)}")
+
+    def close(self) -> None:
+        self._told.append(f"{self._name} closed")
+        if self._fails:
+            raise OutputError(self._name)
+
+
+def test_several_viewers_are_shown_the_same_and_closed_all_whatever_one_raises() -> None:
+    told: list[str] = []
+    several = Viewers([Noting(told, "a", fails=True), Noting(told, "b")])
+    several.show(plain(index=3), [result(T_CAM_OBJ)], {"thing": T_CAM_OBJ})
+    with pytest.raises(OutputError, match="a"):
+        several.close()
+    assert told == ["a 3 1 1", "b 3 1 1", "a closed", "b closed"]
+    Viewers([]).show(plain(), [], {})
+    Viewers([]).close()
