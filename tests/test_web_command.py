@@ -54,8 +54,7 @@ def run(model_file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytes
 def port() -> int:
     """One that is free."""
     with socket.create_server(("127.0.0.1", 0)) as free:
-        number = int(free.getsockname()[1])
-        return number
+        return int(free.getsockname()[1])
 
 
 def meanwhile(port: int, status: str, *messages: dict[str, object]) -> threading.Thread:

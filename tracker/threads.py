@@ -1,11 +1,24 @@
-"""How many threads torch works with."""
+"""How many threads torch works with, and which threads come after others."""
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import torch
+
+
+LAST = 19  # the least of the priorities of POSIX
+
+
+def give_way() -> None:
+    """From here on the calling thread, and those that it starts, run when others leave them time: where the cores are
+    busy, what must not wait does not wait for it. Where the system has no priorities of threads nothing changes."""
+    if sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), LAST)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from tracker.pointing import Click, Pointer, parse_pointer
 from tracker.remote_control import RemoteControl
 from tracker.view import Box
 from tracker.web.board import Board, Shown, as_row, as_sample, packet
+from tracker.web.last_seconds import Extent
 
 if TYPE_CHECKING:
     from aiohttp.web import WebSocketResponse
@@ -24,7 +25,7 @@ MOST_QUESTIONS = 8  # of one browser that wait for the next frame
 
 class Client:
     """pictures: a frame -> its JPEG, made once for all browsers. status: what the page says of the whole run.
-    woken: to be set when there is a new frame, or another status."""
+    extent: of what could be saved. woken: to be set when there is a new frame, or another status."""
 
     def __init__(
         self,
@@ -33,9 +34,10 @@ class Client:
         remote: RemoteControl,
         pictures: Callable[[Shown], Awaitable[bytes]],
         status: Callable[[], Mapping[str, Any]],
+        extent: Callable[[], Extent],
     ) -> None:
         self._socket, self._board, self._remote = socket, board, remote
-        self._pictures, self._status = pictures, status
+        self._pictures, self._status, self._extent = pictures, status, extent
         self._number, self._on_the_way, self._told = 0, 0, ""
         self._questions: set[asyncio.Task[None]] = set()
         self.woken = asyncio.Event()
@@ -83,12 +85,13 @@ class Client:
 
     async def _send(self, shown: Shown) -> None:
         picture = await self._pictures(shown)
-        camera = shown.frame.intrinsics
+        camera, extent = shown.frame.intrinsics, self._extent()
         header = {
             "frame": shown.frame.index,
             "size": [camera.width, camera.height],
             "age_ms": round((time.monotonic() - shown.put_s) * 1e3, 1),
             "rate_hz": round(self._board.rate_hz(), 1),
+            "saved": {"frames": extent.frames, "seconds": extent.seconds, "megabytes": extent.megabytes},
             "rows": [as_row(result) for result in shown.results],
             "samples": [as_sample(past) for past in self._board.since(self._number)],
             "all_samples": self._number == 0,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 import zipfile
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -16,11 +17,15 @@ from tracker.errors import OutputError
 from tracker.frame import Frame
 from tracker.geometry import Intrinsics
 from tracker.handover import Handover
+from tracker.threads import give_way
 
 METRES_PER_UNIT = 0.001  # of the layout that is written
 JPEG_QUALITY = 95
 POLL_S = 0.5
 WAITING = 8  # frames that are not compressed yet; where that takes too long the oldest is left out
+MOST_FRAMES_HZ = (
+    31.0  # a usual camera's; of a recording that is played faster, compressing all would hold up the tracker
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +44,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How much is held. left_out: frames for whose compression there was no time."""
+    """How much is held. left_out: frames for whose compression there was no time, or that came faster than a camera's."""
 
     frames: int
     seconds: float
@@ -57,12 +62,18 @@ class LastSeconds:
         self._seconds, self._most_bytes = seconds, most_bytes
         self._door: Handover[Frame] = Handover(WAITING, newest=True)
         self._held: deque[Held] = deque()
-        self._bytes = 0
+        self._bytes, self._next_s, self._too_fast = 0, 0.0, 0
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._compress, name="the last seconds", daemon=True)
         self._thread.start()
 
     def put(self, frame: Frame) -> None:
+        now_s = time.monotonic()
+        if now_s < self._next_s:
+            self._too_fast += 1
+            return
+        # some that come at once are let through, as of a camera that hiccups
+        self._next_s = max(self._next_s, now_s - WAITING / MOST_FRAMES_HZ) + 1 / MOST_FRAMES_HZ
         self._door.put(frame)
 
     def close(self) -> None:
@@ -78,9 +89,10 @@ class LastSeconds:
     def extent(self) -> Extent:
         with self._lock:
             seconds = (self._held[-1].stamp_ns - self._held[0].stamp_ns) / 1e9 if self._held else 0.0
-            return Extent(len(self._held), seconds, self._bytes / 1e6, self._door.dropped)
+            return Extent(len(self._held), seconds, self._bytes / 1e6, self._door.dropped + self._too_fast)
 
     def _compress(self) -> None:
+        give_way()
         while not self._door.ended:
             frame = self._door.get(POLL_S)
             if frame is not None:
@@ -104,8 +116,13 @@ def compressed(frame: Frame) -> Held:
     depth = np.where(units < 2**16, units, 0).astype(np.uint16)
     colours = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
     colours += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]  # concepts are colours
-    rgb = _encoded(".jpg", frame.rgb[:, :, ::-1], colours)
-    return Held(frame.stamp_ns, frame.intrinsics, rgb, _encoded(".png", depth, [cv2.IMWRITE_PNG_COMPRESSION, 1]))
+    # not by OpenCV, which would start threads here that give way, too, and are the tracker's as well
+    bgr = np.ascontiguousarray(frame.rgb[:, :, ::-1])
+    rgb = _encoded(".jpg", bgr, colours)
+    # the least work that makes it small; OpenCV's own choice takes twice as long
+    fast = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_SUB]
+    fast += [cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
+    return Held(frame.stamp_ns, frame.intrinsics, rgb, _encoded(".png", depth, fast))
 
 
 def zipped(frames: Sequence[Held], name: str) -> Iterator[bytes]:
@@ -145,7 +162,7 @@ class _Pieces(RawIOBase):
 
 
 def _encoded(kind: str, picture: np.ndarray, options: list[int]) -> bytes:
-    written, data = cv2.imencode(kind, np.ascontiguousarray(picture), options)
+    written, data = cv2.imencode(kind, picture, options)
     if not written:
         raise OutputError(f"this OpenCV cannot write {kind} pictures")
     return data.tobytes()

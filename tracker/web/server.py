@@ -142,7 +142,7 @@ class WebPage:
         if len(self._clients) >= MOST_BROWSERS:
             return web.Response(status=503, text=f"{MOST_BROWSERS} browsers are connected already\n")
         socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MOST_BYTES)
-        client = Client(socket, self._board, self._remote, self._overlay, self._status)
+        client = Client(socket, self._board, self._remote, self._overlay, self._status, self._last_seconds.extent)
         self._clients[client] = socket  # before anything is waited for, so that there are never too many
         self._board.listener = self._frame_came
         showing: asyncio.Task[None] | None = None
@@ -191,15 +191,11 @@ class WebPage:
         return await asyncio.shield(self._picture[1])
 
     def _status(self) -> Mapping[str, Any]:
-        extent = self._last_seconds.extent()
         answers = {object_id: self._last_answer(object_id) for object_id in self._boxes}
         return {
             "status": "ended" if self._remote.ended else "paused" if self._remote.paused else "running",
             "title": self._title,
             "objects": list(self._boxes),
             "cannot_point": self._cannot_point,
-            "recording_s": int(extent.seconds),
-            "recording_mb": int(extent.megabytes),
-            "left_out": extent.left_out,
             "concepts": {object_id: answer and answer[0].frame.index for object_id, answer in answers.items()},
         }
