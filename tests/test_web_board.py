@@ -76,6 +76,8 @@ def test_a_row_is_in_millimetres_and_degrees() -> None:
     assert row["quaternion_wxyz"] == pytest.approx(T_CAM_OBJ.quaternion_wxyz, abs=1e-4)
     assert row["sigma_mm"] == pytest.approx(3.0)
     assert row["sigma_deg"] == pytest.approx(np.degrees(0.03), abs=0.01)
+    unknown = as_row(replace(result(T_CAM_OBJ), covariance=np.diag([np.inf] * 6)))
+    assert (unknown["sigma_mm"], unknown["sigma_deg"]) == (None, None)  # JSON has no word for it
 
 
 def test_a_lost_object_has_a_reason_and_no_numbers() -> None:

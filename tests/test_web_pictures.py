@@ -30,7 +30,7 @@ def constant(view: ObjectView, **values: float) -> Saliency:
 def test_the_overlay_is_the_one_that_is_drawn_elsewhere() -> None:
     frame, results = plain(120), (result(T_CAM_OBJ),)
     frame.rgb[..., 0] = 200
-    shown = decoded(overlay_picture(Shown(1, frame, results, {}, 0.0), BOXES))
+    shown = decoded(overlay_picture(Shown(1, frame, results, {}), BOXES))
     expected = draw_overlay(frame, results, BOXES, {})
     assert shown.shape == expected.shape
     assert np.abs(shown.astype(int) - expected).mean() < 4

@@ -258,6 +258,18 @@ def test_two_browsers_are_sent_one_picture(monkeypatch: pytest.MonkeyPatch) -> N
     assert drawn == [1]
 
 
+def test_pictures_are_not_compressed_twice() -> None:
+    with served() as page:
+
+        async def offer() -> None:
+            headers = {"Origin": page.url.rstrip("/")}
+            async with aiohttp.ClientSession() as session:
+                there = await session.ws_connect(f"{page.url}socket", headers=headers, compress=15)
+                assert there.compress == 0
+
+        asyncio.run(offer())
+
+
 def test_one_browser_too_many_is_told() -> None:
     with served() as page:
 

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 
 import torch
 
-
 LAST = 19  # the least of the priorities of POSIX
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import threading
 import time
 from collections import deque
@@ -24,18 +25,17 @@ RATED_S = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """number: of the frame on the board, from 1. put_s: when it was put there, monotonic seconds."""
+    """number: of the frame on the board, from 1."""
 
     number: int
     frame: Frame
     results: tuple[TrackResult, ...]
     truth: Mapping[str, Pose]
-    put_s: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Past:
-    """What is kept of a frame, without its pictures."""
+    """What is kept of a frame, without its pictures. put_s: when it came, monotonic seconds."""
 
     number: int
     index: int
@@ -62,7 +62,7 @@ class Board:
         with self._lock:
             number = self.newest.number + 1 if self.newest else 1
             self._past.append(Past(number, frame.index, frame.stamp_ns, now_s, light))
-            self.newest = Shown(number, frame, tuple(results), truth, now_s)
+            self.newest = Shown(number, frame, tuple(results), truth)
         if listener := self.listener:
             listener()
 
@@ -109,10 +109,13 @@ def as_row(result: TrackResult) -> dict[str, Any]:
         "confidence": round(result.confidence, 3),
         "position_mm": None if pose is None else (pose.translation_m * 1e3).round(2).tolist(),
         "quaternion_wxyz": None if pose is None else pose.quaternion_wxyz.round(4).tolist(),
-        "sigma_mm": None if deviations is None else round(float(np.linalg.norm(deviations[3:])) * 1e3, 2),
-        "sigma_deg": None if deviations is None else round(float(np.degrees(np.linalg.norm(deviations[:3]))), 2),
-        "total_ms": round(result.timings_ms.get("total", 0.0), 1),
+        "sigma_mm": None if deviations is None else _told(float(np.linalg.norm(deviations[3:])) * 1e3),
+        "sigma_deg": None if deviations is None else _told(float(np.degrees(np.linalg.norm(deviations[:3])))),
     }
+
+
+def _told(value: float) -> float | None:
+    return round(value, 2) if math.isfinite(value) else None
 
 
 def packet(header: Mapping[str, Any], picture: bytes) -> bytes:

@@ -89,7 +89,6 @@ class Client:
         header = {
             "frame": shown.frame.index,
             "size": [camera.width, camera.height],
-            "age_ms": round((time.monotonic() - shown.put_s) * 1e3, 1),
             "rate_hz": round(self._board.rate_hz(), 1),
             "saved": {"frames": extent.frames, "seconds": extent.seconds, "megabytes": extent.megabytes},
             "rows": [as_row(result) for result in shown.results],

@@ -44,7 +44,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How much is held. left_out: frames for whose compression there was no time, or that came faster than a camera's."""
+    """How much is held. left_out: frames for which there was no time, or that came faster than those of a camera."""
 
     frames: int
     seconds: float

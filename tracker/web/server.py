@@ -141,7 +141,8 @@ class WebPage:
 
         if len(self._clients) >= MOST_BROWSERS:
             return web.Response(status=503, text=f"{MOST_BROWSERS} browsers are connected already\n")
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MOST_BYTES)
+        # pictures are compressed already
+        socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MOST_BYTES, compress=False)
         client = Client(socket, self._board, self._remote, self._overlay, self._status, self._last_seconds.extent)
         self._clients[client] = socket  # before anything is waited for, so that there are never too many
         self._board.listener = self._frame_came
