@@ -3,6 +3,7 @@
 FOLDER/FINGERPRINT/estimates.csv  BOP's result file, which comes back bit for bit
                    unit.json      counts, times, records, reference frames, refused objects, and what decided them
                    overlay.mp4    where a video was asked for
+                   frames/        where pictures were asked for
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ from eval.predict import Tracked
 from eval.summary import TrackingCounts
 from eval.track_run import fingerprint_of
 from tracker.errors import OutputError
+from tracker.viewer import FRAMES, VIDEO
 
 log = logging.getLogger(__name__)
 
-ESTIMATES, UNIT, VIDEO = "estimates.csv", "unit.json", "overlay.mp4"
+ESTIMATES, UNIT = "estimates.csv", "unit.json"
 
 
 class KeptUnits:
@@ -40,8 +42,9 @@ class KeptUnits:
         except FileNotFoundError:
             return []
 
-    def video(self, fingerprint: str) -> Path:
-        return self.folder / fingerprint / VIDEO
+    def drawn(self, fingerprint: str) -> list[Path]:
+        """The video and the folder of pictures, those that there are."""
+        return [path for name in (VIDEO, FRAMES) if (path := self.folder / fingerprint / name).exists()]
 
     def read(self, fingerprint: str) -> Tracked | None:
         """None where it is not kept, and, with a warning, where what is kept is damaged: it is made again then."""

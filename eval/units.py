@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TypeVar
 
 from eval.datasets import require
-from eval.kept_units import VIDEO, KeptUnits
+from eval.kept_units import KeptUnits
 from eval.predict import Progress, Tracked, track_scene
 from eval.spread import Spreading, spread
 from eval.track_run import TrackRun, code_fingerprint, fingerprint_of, opened_backend, opened_dataset
-from tracker.concept import ConceptModel
 from tracker.errors import ConfigError, TrackerError
 from tracker.threads import torch_threads
-from tracker.viewer import NullViewer, OverlayVideo, Viewer
+from tracker.viewer import overlay_viewer
 
 Item = TypeVar("Item")
 Outcome = Tracked | TrackerError
@@ -26,21 +25,23 @@ UnitsShown = Callable[[Iterable[tuple[int, Outcome]], int, str], Iterable[tuple[
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unit:
-    """A scene of a run. decided_by: as `TrackRun.decided_by`, and whether a video is made. code: of the process that
-    made the unit. video: whether frames are drawn, into the folder where the unit is kept."""
+    """A scene of a run. decided_by: as `TrackRun.decided_by`, and what is drawn of it. code: of the process that
+    made the unit. views: what is drawn, as `overlay_viewer` has it, into the folder where the unit is kept."""
 
     run: TrackRun
     scene_id: int
     decided_by: dict[str, object]
     code: str
-    video: bool = False
+    views: tuple[str, ...] = ()
 
     @property
     def fingerprint(self) -> str:
         return fingerprint_of(self.decided_by)
 
 
-def units_of(run: TrackRun, scene_ids: Sequence[int], video: bool = False) -> tuple[list[Unit], dict[str, object]]:
+def units_of(
+    run: TrackRun, scene_ids: Sequence[int], views: tuple[str, ...] = ()
+) -> tuple[list[Unit], dict[str, object]]:
     """The run's units, in the order of the scenes, and what its report says of it. Opens the backend.
 
     Raises ConfigError and SourceError where the run cannot be.
@@ -51,8 +52,8 @@ def units_of(run: TrackRun, scene_ids: Sequence[int], video: bool = False) -> tu
     for object_id in run.object_ids or ():
         require("object", object_id, dataset.object_ids, dataset.name)
     backend = run.protocol().backend
-    decided = [run.decided_by(scene_id, backend) | {"video": video} for scene_id in scene_ids]
-    units = [Unit(run, s, d, code_fingerprint(), video) for s, d in zip(scene_ids, decided, strict=True)]
+    decided = [run.decided_by(scene_id, backend) | {"views": sorted(set(views))} for scene_id in scene_ids]
+    units = [Unit(run, s, d, code_fingerprint(), views) for s, d in zip(scene_ids, decided, strict=True)]
     return units, run.stated(backend)
 
 
@@ -80,7 +81,7 @@ def track_units(
         opened_backend.cache_clear()  # the others open their own
     threads = max((unit.run.threads for unit in missing), default=1)
     try:
-        stages = [kept.stage(unit.fingerprint) if kept and unit.video else None for unit in missing]
+        stages = [kept.stage(unit.fingerprint) if kept and unit.views else None for unit in missing]
         work = partial(_finished, frames_shown=frames_shown) if spreading.here else _finished
         found = spread(work, list(zip(missing, stages, strict=True)), spreading, threads)
         for place, outcome in found if spreading.here else (units_shown or _not_shown)(found, len(missing), "scenes"):
@@ -105,16 +106,12 @@ def _finished(item: tuple[Unit, Path | None], frames_shown: Progress | None = No
         if code_fingerprint() != unit.code:
             raise ConfigError(f"{platform.node()} would track with other source code than this: install the same there")
         dataset, protocol = opened_dataset(unit.run.dataset), unit.run.protocol()
-        viewer = _no_viewer if folder is None else partial(OverlayVideo, folder / VIDEO)
+        viewer = partial(overlay_viewer, unit.views, folder)
         with torch_threads(unit.run.threads):
             objects, shown = unit.run.object_ids, frames_shown or _not_shown
             return track_scene(dataset, unit.scene_id, protocol, objects, viewer, shown)
     except TrackerError as error:
         return error
-
-
-def _no_viewer(models: Sequence[ConceptModel]) -> Viewer:  # noqa: ARG001
-    return NullViewer()
 
 
 def _not_shown(items: Iterable[Item], total: int, what: str) -> Iterable[Item]:  # noqa: ARG001

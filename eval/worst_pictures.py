@@ -17,7 +17,7 @@ from eval.worst_frames import worst_instances
 from tracker.errors import FrameError, TrackerError
 from tracker.frame import Frame
 from tracker.geometry import Floats, Intrinsics, Pose
-from tracker.viewer import Picture, box_corners, draw_box
+from tracker.overlay import Picture, box_corners, draw_box
 
 log = logging.getLogger(__name__)
 
@@ -72,7 +72,7 @@ def worst_frames(
 def draw_cutout(frame: Frame, estimated: Pose, truth: Pose, corners: Floats) -> Picture:
     """(240, 320, 3) uint8 RGB around the object: the true pose's box green, the estimate's red.
 
-    corners: (8, 3) of the object's box, as `tracker.viewer.box_corners` has them. Raises FrameError where the true
+    corners: (8, 3) of the object's box, as `tracker.overlay.box_corners` has them. Raises FrameError where the true
     pose is behind the camera.
     """
     camera = frame.intrinsics

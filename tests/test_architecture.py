@@ -32,7 +32,8 @@ ORDER = {
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
         "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "lockstep", "places",
-        "reviews", "track", "pipeline", "remote_control", "output", "viewer", "web", "terminal", "__main__",
+        "reviews", "track", "pipeline", "remote_control", "output", "overlay", "video", "viewer", "web", "terminal",
+        "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",

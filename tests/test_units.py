@@ -308,7 +308,8 @@ def test_what_cannot_be_is_refused_in_a_sentence(
 def test_each_scene_has_its_video_when_they_are_drawn_side_by_side(
     track: Callable[..., tuple[int, str]], tmp_path: Path
 ) -> None:
-    options = ("--scenes", 2, 5, "--view", "overlay", "--jobs", 2)
+    options = ("--scenes", 2, 5, "--view", "overlay", "--view", "frames", "--jobs", 2)
     assert track("--out", tmp_path / "out", *options)[0] == 0
     assert {path.name for path in (tmp_path / "out").glob("*.mp4")} == {"overlay_000002.mp4", "overlay_000005.mp4"}
+    assert all((tmp_path / "out" / f"frames_{scene:06d}" / "000000.png").is_file() for scene in (2, 5))
     assert [path.name for path in tmp_path.iterdir()] == ["out"]

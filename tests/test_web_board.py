@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.test_viewer import T_CAM_OBJ, plain, result
+from tests.test_overlay import T_CAM_OBJ, plain, result
 from tracker.output import as_json_line
 from tracker.web import board
 from tracker.web.board import CHARTED_S, Board, as_row, as_sample, packet

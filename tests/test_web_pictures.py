@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.test_viewer import BOXES, T_CAM_OBJ, plain, result
+from tests.test_overlay import SHAPES, T_CAM_OBJ, plain, result
 from tracker.errors import OutputError
+from tracker.overlay import draw_overlay
 from tracker.saliency import Query, Saliency, SaliencyBackend
 from tracker.view import ObjectView
-from tracker.viewer import draw_overlay
 from tracker.web.board import Shown
 from tracker.web.pictures import concept_picture, overlay_picture, strongest
 
@@ -30,8 +30,8 @@ def constant(view: ObjectView, **values: float) -> Saliency:
 def test_the_overlay_is_the_one_that_is_drawn_elsewhere() -> None:
     frame, results = plain(120), (result(T_CAM_OBJ),)
     frame.rgb[..., 0] = 200
-    shown = decoded(overlay_picture(Shown(1, frame, results, {}), BOXES))
-    expected = draw_overlay(frame, results, BOXES, {})
+    shown = decoded(overlay_picture(Shown(1, frame, results, {}), SHAPES))
+    expected = draw_overlay(frame, results, SHAPES, {})
     assert shown.shape == expected.shape
     assert np.abs(shown.astype(int) - expected).mean() < 4
 

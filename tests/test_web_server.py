@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from tests.test_viewer import T_CAM_OBJ, plain, result
+from tests.test_overlay import T_CAM_OBJ, plain, result
 from tests.web_page import LONG_S, Caller, called, served
 from tracker.errors import ConfigError
 from tracker.pointing import Click, Pointer

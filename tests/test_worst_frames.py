@@ -19,9 +19,9 @@ from eval.worst_pictures import ESTIMATE, LARGEST_BYTES, SIZE, TRUTH, draw_cutou
 from tracker.errors import FrameError, SourceError
 from tracker.frame import Frame, PosedFrame
 from tracker.geometry import Pose
+from tracker.overlay import box_corners
 from tracker.sources import Sighting
 from tracker.sources.synthetic import ObjectShape, open_scene
-from tracker.viewer import box_corners
 
 BOX = "tea_box"
 SMALL = open_scene(f"turn?size=160x120&frames=6&object={BOX}")

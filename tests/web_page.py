@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any
 
-from tests.test_viewer import BOXES
+from tests.test_overlay import SHAPES
 from tracker.remote_control import RemoteControl
 from tracker.web.address import Address, gate_of
 from tracker.web.downloads import LastAnswer
@@ -25,7 +25,7 @@ def served(
     cannot_point: str = "",
 ) -> Iterator[WebPage]:
     page = WebPage(
-        gate_of(Address(host, 0), token), "test:scene", BOXES, remote or RemoteControl(), last_answer, cannot_point
+        gate_of(Address(host, 0), token), "test:scene", SHAPES, remote or RemoteControl(), last_answer, cannot_point
     )
     try:
         yield page

@@ -60,8 +60,9 @@ class Track:
     """YAML file with settings that differ from the defaults."""
     smooth: Literal["off", "offline"] = "off"
     """offline: every pose by all frames of the recording, also those after it; the lines are written at the end."""
-    view: Literal["none", "overlay"] = "none"
-    """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed."""
+    view: Annotated[tuple[Literal["overlay", "frames"], ...], tyro.conf.UseAppendAction] = ()
+    """overlay: write overlay.mp4 to the --out folder, with the poses as they were found, not smoothed; H.264 where the
+    program ffmpeg is installed. frames: write a PNG a frame to its folder frames. Once for each."""
     serve: Annotated[str | None, tyro.conf.arg(metavar="[HOST:]PORT")] = None
     """Show all of it live on a page at http://HOST:PORT (this machine alone where there is no HOST); objects can be
     pointed out there, and the last 30 s saved. Other machines need the token that is printed, or CONCEPTRACK_TOKEN."""
@@ -88,7 +89,7 @@ class Track:
         from tracker.remote_control import RemoteControl
         from tracker.saliency import BackendOptions, open_backend
         from tracker.sources import LiveSource, length_of
-        from tracker.viewer import OverlayVideo, Viewer, Viewers
+        from tracker.viewer import Several, overlay_viewer
 
         config = self._config()
         if not self.model:
@@ -106,15 +107,13 @@ class Track:
             tracker = ObjectTracker(models, config, backend, worker)
             for object_id, there in pointed_out.items():
                 tracker.point_out(object_id, there)
-            remote, viewers = RemoteControl(), list[Viewer]()
+            remote = RemoteControl()
             page = self._page(tracker, models, config, remote)
             if page:
-                stack.callback(page.close)
-                viewers.append(page)
+                stack.callback(page.close)  # also where nothing comes to be shown
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
-            if folder and self.view == "overlay":
-                viewers.append(OverlayVideo(folder / "overlay.mp4", models))
-            viewer = Viewers(viewers)
+            drawn = overlay_viewer(self.view, folder, models)
+            viewer = Several([page, drawn]) if page else drawn
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
@@ -198,8 +197,8 @@ class Track:
         from tracker.errors import ConfigError
         from tracker.sources import WITHOUT_MASKS, kind_of
 
-        if self.view != "none" and self.out is None:
-            raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
+        if self.view and self.out is None:
+            raise ConfigError(f"--view {self.view[0]} needs a folder to write to: give --out DIR")
         config = read_config(self.config)
         if self.prior is not None:
             config = config.model_copy(update={"prior": self.prior == "on"})

@@ -7,7 +7,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
 
 from tracker.terminal import STDERR, progress
 
@@ -64,8 +66,9 @@ class Track:
     """YAML file with settings that differ from the defaults."""
     out: Path | None = None
     """Folder for scores.json, results.csv, report.html, report.md, config.yaml and what --view makes."""
-    view: Literal["none", "overlay"] = "none"
-    """overlay: write overlay.mp4 to the --out folder (one for each of several scenes)."""
+    view: Annotated[tuple[Literal["overlay", "frames"], ...], tyro.conf.UseAppendAction] = ()
+    """overlay: write overlay.mp4 to the --out folder (one for each of several scenes), estimates orange, truth green;
+    H.264 where the program ffmpeg is installed. frames: write a PNG a frame to its folder frames. Once for each."""
     overwrite: bool = False
     """Replace results that are in the --out folder, and forget a run that did not end."""
     resume: bool = False
@@ -98,18 +101,18 @@ class Track:
         from tracker.errors import ConfigError
         from tracker.output import require_free, result_folder
 
-        if self.view != "none" and self.out is None:
-            raise ConfigError(f"--view {self.view} needs a folder to write to: give --out DIR")
-        if self.view != "none" and self.cluster is not None:
+        if self.view and self.out is None:
+            raise ConfigError(f"--view {self.view[0]} needs a folder to write to: give --out DIR")
+        if self.view and self.cluster is not None:
             raise ConfigError(
-                f"--view {self.view} draws where the frames are tracked: it goes with --jobs, not --cluster"
+                f"--view {self.view[0]} draws where the frames are tracked: it goes with --jobs, not --cluster"
             )
         if self.resume and self.out is None:
             raise ConfigError("--resume goes on with what is beside a folder: give --out DIR")
         spreading, run = Spreading(self.jobs, self.cluster), self._run()
         dataset = opened_dataset(self.dataset)
         scene_ids = tuple(dataset.scene_ids if self.scenes is None else self.scenes)
-        units, stated = units_of(run, scene_ids, self.view != "none")
+        units, stated = units_of(run, scene_ids, self.view)
         if self.out:
             require_free(self.out, self.overwrite)
         with ExitStack() as stack:
@@ -138,7 +141,7 @@ class Track:
                 write_html(folder / "report.html", report)
                 write_markdown(folder / "report.md", report)
                 (folder / "config.yaml").write_text(dump_config(run.config))
-                _take_videos(kept, units, folder)
+                _take_pictures(kept, units, folder)
         who = f"backend {self.backend}" if method_kind(self.method).concepts else f"method {self.method}"
         for each in tables(scores, f"{self.dataset}, {self.views} views, {who}"):
             STDERR.print(each)
@@ -205,11 +208,11 @@ class Track:
         shutil.rmtree(kept.folder, ignore_errors=True)
 
 
-def _take_videos(kept: KeptUnits | None, units: Sequence[Unit], folder: Path) -> None:
-    """Move the videos that there are from the scenes to the results."""
+def _take_pictures(kept: KeptUnits | None, units: Sequence[Unit], folder: Path) -> None:
+    """Move what was drawn of the scenes to the results."""
     if kept is None:
         return
     for unit in units:
-        video = kept.video(unit.fingerprint)
-        if video.exists():
-            shutil.move(video, folder / ("overlay.mp4" if len(units) == 1 else f"overlay_{unit.scene_id:06d}.mp4"))
+        for drawn in kept.drawn(unit.fingerprint):
+            name = drawn.name if len(units) == 1 else f"{drawn.stem}_{unit.scene_id:06d}{drawn.suffix}"
+            shutil.move(drawn, folder / name)

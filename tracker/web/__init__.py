@@ -54,7 +54,7 @@ def open_page(
     Raises MissingExtraError without aiohttp, ConfigError for an address or a token that cannot be meant, OutputError
     where the port is taken.
     """
-    from tracker.viewer import box_corners
+    from tracker.overlay import shapes_of
     from tracker.web.address import gate_of, parse_address
     from tracker.web.server import WebPage
 
@@ -64,7 +64,6 @@ def open_page(
         raise MissingExtraError(f"the page needs aiohttp ({error}): pip install 'conceptrack[web]'") from error
     gate = gate_of(parse_address(address), token)
     cannot_point = "" if config.masks == "carried" else CANNOT_POINT
-    boxes = {model.object_id: box_corners(model.points) for model in models}
-    page = WebPage(gate, title, boxes, remote, tracker.last_answer, cannot_point)
+    page = WebPage(gate, title, shapes_of(models), remote, tracker.last_answer, cannot_point)
     made_here = gate.token if token is None else None
     return OpenedPage(page, f"{page.url}?token={made_here}" if made_here else page.url)

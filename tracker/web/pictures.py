@@ -9,19 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from tracker.errors import OutputError
-from tracker.geometry import Floats
+from tracker.overlay import Picture, Shape, draw_overlay
 from tracker.saliency import Saliency
 from tracker.view import Float32s, ObjectView
-from tracker.viewer import Picture, draw_overlay
 from tracker.web.board import Shown
 
 QUALITY = 80
 LEAST_PX = 160  # of a map's longer side
 
 
-def overlay_picture(shown: Shown, boxes: Mapping[str, Floats]) -> bytes:
-    """boxes: object id -> corners as of `tracker.viewer.box_corners`."""
-    return as_jpeg(draw_overlay(shown.frame, shown.results, boxes, shown.truth))
+def overlay_picture(shown: Shown, shapes: Mapping[str, Shape]) -> bytes:
+    """shapes: what is drawn of every object, by its id."""
+    return as_jpeg(draw_overlay(shown.frame, shown.results, shapes, shown.truth))
 
 
 def strongest(view: ObjectView, saliency: Saliency) -> Sequence[tuple[str, float]]:

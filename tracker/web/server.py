@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from tracker.errors import ConfigError
 from tracker.frame import Frame
-from tracker.geometry import Floats, Pose
+from tracker.geometry import Pose
+from tracker.overlay import Shape
 from tracker.remote_control import RemoteControl
 from tracker.result import TrackResult
 from tracker.web.address import Gate, listen
@@ -38,8 +39,8 @@ SHUTDOWN_S, PATIENCE_S = 1.0, 10.0
 class WebPage:
     """A viewer in the browser, served from its making until `close`.
 
-    gate: where, and for whom. title: what is tracked in, as the user wrote it. boxes: object id -> corners (8, 3) as of
-    `tracker.viewer.box_corners`. last_answer: of an object, what `ObjectTracker.last_answer` says. cannot_point: why no
+    gate: where, and for whom. title: what is tracked in, as the user wrote it. shapes: what is drawn of
+    every object, by its id. last_answer: of an object, what `ObjectTracker.last_answer` says. cannot_point: why no
     object can be pointed out, "" where they can.
     Raises OutputError where the address is not free.
     """
@@ -48,12 +49,12 @@ class WebPage:
         self,
         gate: Gate,
         title: str,
-        boxes: Mapping[str, Floats],
+        shapes: Mapping[str, Shape],
         remote: RemoteControl,
         last_answer: LastAnswer,
         cannot_point: str = "",
     ) -> None:
-        self._gate, self._title, self._boxes, self._remote = gate, title, boxes, remote
+        self._gate, self._title, self._shapes, self._remote = gate, title, shapes, remote
         self._last_answer, self._cannot_point = last_answer, cannot_point
         self._listening = listen(gate.address)
         self._port = int(self._listening.getsockname()[1])
@@ -187,16 +188,16 @@ class WebPage:
     async def _overlay(self, shown: Shown) -> bytes:
         """Made once, for whichever browser asks first."""
         if self._picture is None or self._picture[0] != shown.number:
-            making = asyncio.get_running_loop().run_in_executor(self._workers, overlay_picture, shown, self._boxes)
+            making = asyncio.get_running_loop().run_in_executor(self._workers, overlay_picture, shown, self._shapes)
             self._picture = shown.number, making
         return await asyncio.shield(self._picture[1])
 
     def _status(self) -> Mapping[str, Any]:
-        answers = {object_id: self._last_answer(object_id) for object_id in self._boxes}
+        answers = {object_id: self._last_answer(object_id) for object_id in self._shapes}
         return {
             "status": "ended" if self._remote.ended else "paused" if self._remote.paused else "running",
             "title": self._title,
-            "objects": list(self._boxes),
+            "objects": list(self._shapes),
             "cannot_point": self._cannot_point,
             "concepts": {object_id: answer and answer[0].frame.index for object_id, answer in answers.items()},
         }
