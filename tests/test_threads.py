@@ -9,7 +9,7 @@ import threading
 import pytest
 import torch
 
-from tracker.threads import give_way, one_thread
+from tracker.threads import NICENESS, give_way, one_thread
 
 
 def test_one_within_and_as_before_afterwards() -> None:
@@ -38,5 +38,5 @@ def test_a_thread_that_gives_way_is_alone_in_that() -> None:
     other = threading.Thread(target=give)
     other.start()
     other.join()
-    assert told == [19]
+    assert told == [NICENESS]
     assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) == before
