@@ -39,9 +39,9 @@ SHUTDOWN_S, PATIENCE_S = 1.0, 10.0
 class WebPage:
     """A viewer in the browser, served from its making until `close`.
 
-    gate: where, and for whom. title: what is tracked in, as the user wrote it. shapes: what is drawn of
-    every object, by its id. last_answer: of an object, what `ObjectTracker.last_answer` says. cannot_point: why no
-    object can be pointed out, "" where they can.
+    gate: where, and for whom. title: what is tracked in, as the user wrote it. shapes: what is drawn of every object,
+    by its id. last_answer: of an object, what `ObjectTracker.last_answer` says. cannot_point: why no object can be
+    pointed out, "" where they can.
     Raises OutputError where the address is not free.
     """
 
