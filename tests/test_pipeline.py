@@ -415,3 +415,20 @@ def test_of_poses_that_a_symmetry_makes_one_the_nearest_to_the_prediction_is_rep
     assert len(told) == len(can_frames)
     needed = parse_symmetry("z:inf").nearest(truth[-1], truth[0]).angle_to_rad(truth[0])
     assert told[0].angle_to_rad(told[-1]) < needed + np.radians(3) < truth[0].angle_to_rad(truth[-1]) - np.radians(3)
+
+
+def test_what_the_concepts_were_asked_of_last_is_kept(can_model: ConceptModel, can_frames: list[Frame]) -> None:
+    tracker = ObjectTracker(can_model, TrackerConfig(concepts_every=3))
+    assert tracker.last_answer(CAN) is None
+    asked = []
+    for frame in can_frames[:8]:
+        (result,) = tracker.step(frame)
+        answer = tracker.last_answer(CAN)
+        assert answer is not None
+        view, saliency = answer
+        assert saliency.labels == can_model.labels
+        assert saliency.box == view.box
+        assert (view.frame is frame) == ("saliency" in result.timings_ms)
+        asked.append(view.frame.index)
+    assert 1 < len(set(asked)) < 8
+    assert tracker.last_answer("mug") is None

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
+
 import pytest
 import torch
 
-from tracker.threads import one_thread
+from tracker.threads import NICENESS, give_way, one_thread
 
 
 def test_one_within_and_as_before_afterwards() -> None:
@@ -20,3 +24,19 @@ def test_one_within_and_as_before_afterwards() -> None:
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(before)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="threads have no priorities of their own here")
+def test_a_thread_that_gives_way_is_alone_in_that() -> None:
+    before = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+    told: list[int] = []
+
+    def give() -> None:
+        give_way()
+        told.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
+
+    other = threading.Thread(target=give)
+    other.start()
+    other.join()
+    assert told == [NICENESS]
+    assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) == before

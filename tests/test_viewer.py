@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import cv2
@@ -13,7 +14,7 @@ from tracker.errors import OutputError
 from tracker.frame import Frame
 from tracker.geometry import Intrinsics, Pose
 from tracker.result import TrackResult, TrackState
-from tracker.viewer import FRAMES, VIDEO, NullViewer, OverlayFiles, overlay_viewer
+from tracker.viewer import FRAMES, VIDEO, NullViewer, OverlayFiles, Several, overlay_viewer
 
 CAMERA = Intrinsics(300.0, 310.0, 158.0, 121.5, 320, 240)
 T_CAM_OBJ = Pose.exp((0.4, -0.5, 0.3, 0.0, 0.0, 0.0)).nudged(np.array([0, 0, 0, 0.02, 0.04, 0.6]))
@@ -103,3 +104,28 @@ def test_no_viewer_is_a_viewer() -> None:
     viewer = NullViewer()
     viewer.show(plain(), [result()], {})
     viewer.close()
+
+
+class Noting:
+    """Takes down what it is told, and cannot be closed when it is told so."""
+
+    def __init__(self, told: list[str], name: str, fails: bool = False) -> None:
+        self._told, self._name, self._fails = told, name, fails
+
+    def show(self, frame: Frame, results: Sequence[TrackResult], truth: Mapping[str, Pose]) -> None:
+        self._told.append(f"{self._name} {frame.index} {len(results)} {len(truth)}")
+
+    def close(self) -> None:
+        self._told.append(f"{self._name} closed")
+        if self._fails:
+            raise OutputError(self._name)
+
+
+def test_several_viewers_are_shown_the_same_and_closed_all_whatever_one_raises() -> None:
+    told: list[str] = []
+    several = Several([Noting(told, "a"), Noting(told, "b", fails=True)])
+    several.show(plain(index=3), [result()], {"thing": T_CAM_OBJ})
+    with pytest.raises(OutputError, match="b"):
+        several.close()
+    assert told[:2] == ["a 3 1 1", "b 3 1 1"]
+    assert sorted(told[2:]) == ["a closed", "b closed"]

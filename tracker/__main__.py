@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections import Counter
 from contextlib import ExitStack
@@ -19,10 +20,13 @@ if TYPE_CHECKING:
 
     from tracker.concept import ConceptModel
     from tracker.config import TrackerConfig
+    from tracker.pipeline import ObjectTracker
     from tracker.pointing import Pointer
+    from tracker.remote_control import RemoteControl
     from tracker.result import TrackResult
     from tracker.sources import FrameSource
     from tracker.viewer import Viewer
+    from tracker.web.server import WebPage
 
 
 @dataclass
@@ -69,6 +73,9 @@ class Track:
     Rerun's (extra rerun) with all that is seen and said. Once for each."""
     rrd: Path | None = None
     """Write what --view rerun shows to this file (.rrd), to be opened anywhere (extra rerun)."""
+    serve: Annotated[str | None, tyro.conf.arg(metavar="[HOST:]PORT")] = None
+    """Show all of it live on a page at http://HOST:PORT (this machine alone where there is no HOST); objects can be
+    pointed out there, and the last 30 s saved. Other machines need the token that is printed, or CONCEPTRACK_TOKEN."""
     record: Path | None = None
     """Write what the camera sees to this file (.db3) while it is tracked."""
     overwrite: bool = False
@@ -90,10 +97,12 @@ class Track:
         from tracker.output import PoseLines, PoseOutput, result_folder
         from tracker.pipeline import ObjectTracker
         from tracker.pose_files import open_pose_files
+        from tracker.remote_control import RemoteControl
         from tracker.ros_results import PosePublisher
         from tracker.saliency import BackendOptions, open_backend
         from tracker.saved_run import SavedRun
         from tracker.sources import LiveSource, RosSource, length_of
+        from tracker.viewer import Several
 
         hush(self.quiet or self.json)
         config = self._config()
@@ -112,8 +121,13 @@ class Track:
             tracker = ObjectTracker(models, config, backend, worker)
             for object_id, there in pointed_out.items():
                 tracker.point_out(object_id, there)
+            remote = RemoteControl()
+            page = self._page(tracker, models, config, remote)
+            if page:
+                stack.callback(page.close)  # also where nothing comes to be shown
             folder = stack.enter_context(result_folder(self.out, self.overwrite)) if self.out else None
-            viewer = self._viewer(folder, models)
+            drawn = self._viewer(folder, models)
+            viewer = Several([page, drawn]) if page else drawn
             stack.callback(viewer.close)
             if folder:
                 (folder / "config.yaml").write_text(dump_config(config))
@@ -140,6 +154,10 @@ class Track:
                         output.add(frame, results)
                     if live:
                         summary.latencies_ms.append(live.latency_ms())
+                    remote.carry_out(tracker)
+                if page:
+                    STDERR.print("there are no more frames; the page stays until ctrl-C")
+                    page.stay("there are no more frames")
             except KeyboardInterrupt:
                 ALWAYS.print("stopped; what was tracked is kept")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
@@ -181,6 +199,19 @@ class Track:
         if self.rrd is not None:
             require_free(self.rrd, self.overwrite)
         return Several((drawn, RerunLog(models, self.rrd, window=window)))
+
+    def _page(
+        self, tracker: ObjectTracker, models: Sequence[ConceptModel], config: TrackerConfig, remote: RemoteControl
+    ) -> WebPage | None:
+        """The page that is served, its link printed; None where none is asked for. Raises as `open_page` does."""
+        if self.serve is None:
+            return None
+        from tracker.web import TOKEN_VARIABLE, open_page
+
+        token = os.environ.get(TOKEN_VARIABLE)
+        opened = open_page(self.serve, token, self.source, tracker, models, config, remote)
+        STDERR.print(f"the page: {opened.link}", highlight=False, soft_wrap=True, markup=False)
+        return opened.page
 
     def _opened_source(self) -> FrameSource:
         """Raises SourceError and OutputError, also where it cannot be recorded as it is asked for."""

@@ -29,11 +29,12 @@ class TrackerConfig(BaseModel):
     says which pixels are the object's, of a lost object that is seen again, and of one that has jumped. trust: score of
     the evidence (`tracker.verification.Evidence`) from which no other pose is looked for. jump: by how much the score
     may be lower than the last one for that. sure: confidence from which a pose whose score is so is not compared with
-    others either, whatever that is, and that is asked of an object that was expected nowhere. concepts_every: looks of which one asks for the concepts nevertheless, where
-    surface and colours alone lead from the prediction to such a pose. verified: candidates that are refined. seed: of
-    the sampling. device: of matching and registration, "auto" is CUDA where there is one. masks: "given" by every
-    frame, or "carried" on by the tracker itself from the first one on, which a frame's mask overrules. search_every:
-    frames between searches of the whole picture for an object that is lost."""
+    others either, whatever that is, and that is asked of an object that was expected nowhere. concepts_every: looks of
+    which one asks for the concepts nevertheless, where surface and colours alone lead from the prediction to such a
+    pose. verified: candidates that are refined. seed: of the sampling. device: of matching and registration, "auto" is
+    CUDA where there is one. masks: "given" by every frame, or "carried" on by the tracker itself from the first one on,
+    which a frame's mask overrules. search_every: frames between searches of the whole picture for an object that is
+    lost."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

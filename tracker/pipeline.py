@@ -55,6 +55,7 @@ class ObjectTracker:
         self._tracks = [Track(model, config) for model in models]
         self._camera = CameraMotion()
         self._config, self._last_stamp_ns, self._placed_ns = config, -1, -1
+        self._answers: dict[str, tuple[ObjectView, Saliency]] = {}
 
     def place(self, object_id: str, T_cam_obj: Pose, stamp_ns: int) -> None:
         """Tell where an object is, roughly: the next frame looks there first, and elsewhere where it is not there.
@@ -132,6 +133,11 @@ class ObjectTracker:
         """In which an object asked for them while the worker was busy with an earlier frame."""
         return self._reviews.skipped if self._reviews else 0
 
+    def last_answer(self, object_id: str) -> tuple[ObjectView, Saliency] | None:
+        """What was looked at of an object when its concepts were asked for last, and where they were; None if they
+        never were. From any thread."""
+        return self._answers.get(object_id)
+
     def _review(self, reviews: Reviews, moments: Sequence[Moment]) -> None:
         """What the worker is to look at next, if it has time."""
         offered = [(track, track.review(now), now) for track, now in zip(self._tracks, moments, strict=True)]
@@ -161,6 +167,9 @@ class ObjectTracker:
         def answered(views: Mapping[int, ObjectView]) -> dict[int, Saliency | None]:
             queries = [Query(view, tracks[k].labels) for k, view in views.items()]
             with Stopwatch.shared([moments[k].clock for k in views], "saliency"):
-                return dict(zip(views, self._backend(queries), strict=True))
+                answers = self._backend(queries)
+            for k, query, answer in zip(views, queries, answers, strict=True):
+                self._answers[tracks[k].object_id] = query.view, answer
+            return dict(zip(views, answers, strict=True))
 
         return answered
