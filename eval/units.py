@@ -52,7 +52,7 @@ def units_of(
     for object_id in run.object_ids or ():
         require("object", object_id, dataset.object_ids, dataset.name)
     backend = run.protocol().backend
-    decided = [run.decided_by(scene_id, backend) | {"views": sorted(set(views))} for scene_id in scene_ids]
+    decided = [run.decided_by(scene_id, backend) | {"drawn": sorted(set(views))} for scene_id in scene_ids]
     units = [Unit(run, s, d, code_fingerprint(), views) for s, d in zip(scene_ids, decided, strict=True)]
     return units, run.stated(backend)
 

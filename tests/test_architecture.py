@@ -32,8 +32,8 @@ ORDER = {
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
         "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "lockstep", "places",
-        "reviews", "track", "pipeline", "remote_control", "bop_rows", "pose_files", "ros_results", "output", "saved_run",
-        "overlay", "video", "viewer", "web", "rerun_log", "terminal", "__main__",
+        "reviews", "track", "pipeline", "remote_control", "bop_rows", "pose_files", "ros_results", "output",
+        "saved_run", "overlay", "video", "viewer", "web", "rerun_log", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",

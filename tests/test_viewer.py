@@ -14,7 +14,7 @@ from tracker.errors import OutputError
 from tracker.frame import Frame
 from tracker.geometry import Intrinsics, Pose
 from tracker.result import TrackResult, TrackState
-from tracker.viewer import FRAMES, VIDEO, NullViewer, OverlayFiles, Several, overlay_viewer
+from tracker.viewer import FRAMES, VIDEO, NullViewer, OverlayFiles, Several, Viewer, overlay_viewer
 
 CAMERA = Intrinsics(300.0, 310.0, 158.0, 121.5, 320, 240)
 T_CAM_OBJ = Pose.exp((0.4, -0.5, 0.3, 0.0, 0.0, 0.0)).nudged(np.array([0, 0, 0, 0.02, 0.04, 0.6]))
@@ -90,12 +90,18 @@ def test_pictures_of_no_frames_are_no_files(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def show_and_close(viewer: Viewer) -> None:
+    for index in range(30):
+        viewer.show(plain(index % 8), [], {})
+    viewer.close()
+
+
 @pytest.mark.parametrize("view", ["overlay", "frames"])
 def test_what_cannot_be_written_is_an_error(view: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("no folder")
     viewer = overlay_viewer((view,), tmp_path / "file", [model()])
     with pytest.raises(OutputError, match="cannot"):
-        viewer.show(plain(), [], {})
+        show_and_close(viewer)
     viewer.close()
     capfd.readouterr()  # what the codec says of it
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Collection, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Protocol
@@ -19,6 +21,7 @@ from tracker.result import TrackResult
 from tracker.video import VideoFile
 
 FALLBACK_RATE_HZ = 30.0
+MOST_WAITING = 8  # frames that are to be drawn yet
 VIDEO, FRAMES = "overlay.mp4", "frames"  # in a folder of results
 
 
@@ -66,8 +69,9 @@ class Several:
 class OverlayFiles:
     """Draws `tracker.overlay` of every frame once, into a video, into a folder of PNG files, or both.
 
+    That is done by a thread, so that the tracker does not wait for it unless it falls behind by MOST_WAITING frames.
     video: of rate_hz pictures a second. pictures: a folder, which is made: 000012.png is the frame of index 12.
-    Raises OutputError where something cannot be written.
+    `show` and `close` raise OutputError, once, where something could not be written of this frame or an earlier one.
     """
 
     def __init__(
@@ -79,20 +83,40 @@ class OverlayFiles:
     ) -> None:
         self._shapes, self._pictures = shapes_of(models), pictures
         self._video = VideoFile(video, rate_hz) if video else None
+        self._worker = ThreadPoolExecutor(1)
+        self._waiting: deque[Future[None]] = deque()
 
     def show(self, frame: Frame, results: Sequence[TrackResult], truth: Mapping[str, Pose]) -> None:
-        bgr = np.ascontiguousarray(draw_overlay(frame, results, self._shapes, truth)[:, :, ::-1])
+        while self._waiting and (self._waiting[0].done() or len(self._waiting) >= MOST_WAITING):
+            self._finish_oldest()
+        self._waiting.append(self._worker.submit(self._write, frame, tuple(results), dict(truth)))
+
+    def close(self) -> None:
+        try:
+            while self._waiting:
+                self._finish_oldest()
+        finally:
+            self._worker.shutdown(cancel_futures=True)
+            if self._video:
+                self._video.close()
+
+    def _finish_oldest(self) -> None:
+        try:
+            self._waiting.popleft().result()
+        except BaseException:
+            self._waiting.clear()  # they would say the same again
+            raise
+
+    def _write(self, frame: Frame, results: Sequence[TrackResult], truth: Mapping[str, Pose]) -> None:
+        bgr = cv2.cvtColor(draw_overlay(frame, results, self._shapes, truth), cv2.COLOR_RGB2BGR)
+        bgr = np.asarray(bgr, np.uint8)
         if self._video:
             self._video.write(bgr)
         if self._pictures:
-            _, encoded = cv2.imencode(".png", bgr, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+            _, encoded = cv2.imencode(".png", bgr)
             path = self._pictures / f"{frame.index:06d}.png"
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(encoded.tobytes())
             except OSError as error:
                 raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
-
-    def close(self) -> None:
-        if self._video:
-            self._video.close()
