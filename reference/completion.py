@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from tracker.frame import Frame, Mask, PosedFrame
 from tracker.geometry import Pose
 from tracker.result import TrackResult
 from tracker.saliency import SaliencyBackend
+from tracker.symmetry import Symmetry
 
 logger = logging.getLogger(__name__)
 
@@ -30,7 +32,11 @@ class Completion:
     those that it is made of, and that contradict none of them. Where the tracker is less sure of its poses afterwards,
     the frame is taken out again.
 
-    model: the last one. refused: frames that did not join or were taken out, by name and with the reason.
+    symmetry: of the object; None looks for it in every model anew, as a few views may not show it. Unless it is given,
+    it is that of the first model.
+
+    model: the last one. views: that it is made of. proven: no frame has joined so lately that it may be taken out
+    again. refused: frames that did not join or were taken out, by name and with the reason.
     """
 
     def __init__(
@@ -39,9 +45,11 @@ class Completion:
         backend: SaliencyBackend,
         config: TrackerConfig | None = None,
         most_views: int = MOST_VIEWS,
+        symmetry: Symmetry | Literal["as it is"] | None = "as it is",
     ) -> None:
         config = (config or TrackerConfig()).model_copy(update={"prior": False, "masks": "given"})
-        self._registration = Registration(backend, config, model.labels, model.symmetry, LEAST_CONFIDENCE)
+        symmetry = model.symmetry if symmetry == "as it is" else symmetry
+        self._registration = Registration(backend, config, model.labels, symmetry, LEAST_CONFIDENCE)
         self._growing = GrowingModel(self._registration, model.references, model)
         self._most_views = most_views
         self._seen_from = list(model.view_directions)
@@ -52,6 +60,14 @@ class Completion:
     @property
     def model(self) -> ConceptModel:
         return self._growing.model
+
+    @property
+    def views(self) -> int:
+        return len(self._growing.frames)
+
+    @property
+    def proven(self) -> bool:
+        return self._smaller is None
 
     @property
     def refused(self) -> tuple[str, ...]:

@@ -7,7 +7,6 @@ without a jump.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -17,6 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from reference.keyframes import LEAST_VISIBLE_PX
+from reference.planes import Plane, planes_behind
 from tracker.errors import OnboardingError
 from tracker.frame import Frame, Mask
 from tracker.geometry import Floats
@@ -24,32 +24,14 @@ from tracker.pointing import REACH_PX, Click, Pointer, clicked_m, measured_in
 from tracker.view import Box, bounding_box
 
 JUMP_M, JUMP_SHARE = 0.01, 0.01  # between neighbouring pixels, of the depth: where it is more, one thing ends
-NEARBY_M = 0.4  # around what is pointed at: planes that matter are seen there
-TRIED, SAMPLED, NEAR_PLANE_M = 400, 3000, 0.008  # RANSAC: planes, points to compare by, what is on one
-LEAST_THICK_M, MOST_THICK_M = 0.004, 0.012  # of what is taken away with a plane: three sigma of its points, within this
-MOST_PLANES, LEAST_PLANE_SHARE = 5, 0.08  # the table, walls, faces of the thing; of the points that are looked at
-LEAST_ABOVE = 0.2  # of the points in a box that have to be before a plane which is behind the thing
-GAP_PX, GAP_JUMP = 5, 2.0  # without depth, and how much larger a jump may be there, so that a surface goes on behind: the rim of a mug is seen as such
+GAP_PX, GAP_JUMP = 5, 2.0  # a surface goes on behind so many pixels without depth, with a larger jump: a mug's rim
 RIM_PX = 2.5  # pixels without depth along an edge that are the nearest surface's
 STANDS_WITHIN_M = 0.03  # of the plane: the lowest that is seen of a thing on it
-PLAUSIBLE_M = (0.02, 0.5)  # size of a thing that somebody means without saying so
+PLAUSIBLE_M = (0.02, 0.6)  # size of a thing
 MOST_OF_PICTURE = 0.5
 MOSTLY, WHOLLY = 0.5, 0.95  # of the main component has to be in the box, and of a further piece
 
 Labels = npt.NDArray[np.int32]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Plane:
-    """normal (3,) points to the camera's side; thick_m is what counts as on it."""
-
-    normal: Floats
-    offset_m: float
-    thick_m: float
-
-    def height_m(self, points: Floats) -> Floats:
-        """(N,) of points (N, 3), above 0 on the camera's side."""
-        return points @ self.normal + self.offset_m
 
 
 def segment(frame: Frame, there: Pointer | None = None, seed: int = 42) -> Mask:
@@ -65,7 +47,7 @@ def segment(frame: Frame, there: Pointer | None = None, seed: int = 42) -> Mask:
         raise OnboardingError(f"{where}: {len(rows)} pixels have depth, no thing can be told from its surroundings")
     points = frame.intrinsics.unproject(columns, rows, frame.depth_m[rows, columns].astype(np.float64))
     meant = _meant(frame, there, where)
-    planes = _planes_behind(points, meant, np.random.default_rng(seed))
+    planes = planes_behind(points, meant, np.random.default_rng(seed))
     standing = np.ones(len(points), bool)
     for plane in planes:
         standing &= plane.height_m(points) > plane.thick_m
@@ -85,6 +67,12 @@ def segment(frame: Frame, there: Pointer | None = None, seed: int = 42) -> Mask:
         raise OnboardingError(
             f"{where}: what is there fills {mask.mean():.0%} of the picture and hangs together with all around it; "
             "expected a thing that stands apart. Move it away from what it touches, or give a box"
+        )
+    size_m = _size_m(mask, frame)
+    if size_m > PLAUSIBLE_M[1]:
+        raise OnboardingError(
+            f"{where}: what is there is {size_m:.1f} m wide and not one thing; expected something of up to "
+            f"{PLAUSIBLE_M[1]:g} m that stands apart. Point at the thing itself, or give a box"
         )
     if mask.sum() < LEAST_VISIBLE_PX:
         raise OnboardingError(
@@ -109,63 +97,16 @@ def _meant(frame: Frame, there: Pointer | None, where: str) -> Floats | None:
     return frame.intrinsics.unproject(columns, rows, frame.depth_m[rows, columns].astype(np.float64))
 
 
-def _planes_behind(points: Floats, meant: Floats | None, rng: np.random.Generator) -> list[_Plane]:
-    """Of the largest planes around what is meant those that have it on the camera's side, the largest first. Where
-    nothing is meant, the largest of all."""
-    if meant is not None:
-        points = points[np.linalg.norm(points - np.median(meant, axis=0), axis=1) < NEARBY_M]
-    planes, least, left = [], max(LEAST_PLANE_SHARE * len(points), 3), points
-    for _ in range(1 if meant is None else MOST_PLANES):
-        plane = _largest_plane(left, rng) if len(left) >= least else None
-        if plane is None:
-            break
-        on = np.abs(plane.height_m(left)) < max(plane.thick_m, NEAR_PLANE_M)
-        if on.sum() < least:
-            break
-        if planes and plane.thick_m == MOST_THICK_M:  # a slab through several things
-            pass
-        elif meant is None or (plane.height_m(meant) > plane.thick_m).mean() >= LEAST_ABOVE:
-            planes.append(plane)
-        left = left[~on]
-    return planes
-
-
-def _largest_plane(points: Floats, rng: np.random.Generator) -> _Plane | None:
-    """By RANSAC, then fitted to its points (of N, 3). None where all points are on a line."""
-    corners = points[rng.integers(len(points), size=(TRIED, 3))]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    usable = lengths > 1e-9
-    if not usable.any():
-        return None
-    normals = normals[usable] / lengths[usable, None]
-    offsets = -np.einsum("ij,ij->i", normals, corners[usable, 0])
-    compared = points[rng.integers(len(points), size=SAMPLED)]
-    best = int(np.argmax((np.abs(compared @ normals.T + offsets) < NEAR_PLANE_M).sum(axis=0)))
-    plane = _Plane(normals[best], float(offsets[best]), NEAR_PLANE_M)
-    for _ in range(2):
-        near = points[np.abs(plane.height_m(points)) < NEAR_PLANE_M]
-        centre = near.mean(axis=0)
-        normal = np.linalg.eigh(np.cov((near - centre).T))[1][:, 0]
-        normal = normal if normal @ centre < 0 else -normal  # the camera is the origin
-        sigma_m = 1.4826 * float(np.median(np.abs((near - centre) @ normal)))
-        plane = _Plane(normal, -float(normal @ centre), float(np.clip(3 * sigma_m, LEAST_THICK_M, MOST_THICK_M)))
-    return plane
-
-
 def _connected(kept: Mask, depth_m: npt.NDArray[np.float32]) -> Labels:
     """(H, W) the component of every kept pixel from 1 on, 0 elsewhere."""
     numbers, measured = np.arange(kept.size).reshape(kept.shape), depth_m > 0
     ends: list[tuple[npt.NDArray[Any], npt.NDArray[Any]]] = []
     for axis in (0, 1):
-        across = [np.swapaxes(picture, 0, axis) for picture in (numbers, kept, depth_m, measured)]
-        number, keep, depth, known = across
+        number, keep = np.swapaxes(numbers, 0, axis), np.swapaxes(kept, 0, axis)
+        depth, known = np.swapaxes(depth_m, 0, axis), np.swapaxes(measured, 0, axis)
         nothing = np.ones_like(keep)  # between a pixel and the one so many further
         for gap in range(1, GAP_PX + 2):
-            if gap > 1:
-                nothing = nothing[:-1] & ~known[gap - 1 : -1]
-            else:
-                nothing = nothing[:-1]
+            nothing = nothing[:-1] & ~known[gap - 1 : -1] if gap > 1 else nothing[:-1]
             jump_m = np.maximum(JUMP_M, JUMP_SHARE * depth[:-gap]) * (GAP_JUMP if gap > 1 else 1)
             joined = nothing & keep[:-gap] & keep[gap:] & (np.abs(depth[:-gap] - depth[gap:]) < jump_m)
             ends.append((number[:-gap][joined], number[gap:][joined]))
@@ -181,8 +122,8 @@ def _clicked(labels: Labels, click: Click, where: str) -> int:
     found, counts = np.unique(labels[inside & (labels > 0)], return_counts=True)
     if not len(found):
         raise OnboardingError(
-            f"{where}: pixel {click.column},{click.row} shows what things stand on, or nothing; expected a pixel on the "
-            "thing itself"
+            f"{where}: pixel {click.column},{click.row} shows what things stand on, or nothing; expected a pixel "
+            "on the thing itself"
         )
     return int(found[np.argmax(counts)])
 
@@ -201,16 +142,20 @@ def _boxed(labels: Labels, box: Box, frame: Frame, where: str) -> Mask:
         )
     mostly &= within > 0
     main = labels == int(np.argmax(np.where(mostly, within, 0)))
-    box_of_main = bounding_box(main)
-    depths_m = frame.depth_m[main]
-    width_px = max(box_of_main.x1 - box_of_main.x0, box_of_main.y1 - box_of_main.y0) if box_of_main else 0
-    size_m = width_px * float(np.median(depths_m)) / frame.intrinsics.fx
-    near = np.abs(frame.depth_m - np.median(depths_m)) < size_m
+    near = np.abs(frame.depth_m - np.median(frame.depth_m[main])) < _size_m(main, frame)
     wholly = (within > 0) & (within >= WHOLLY * whole)
     return main & inside | (mostly & wholly)[labels] & near & inside
 
 
-def _nearest(labels: Labels, frame: Frame, planes: list[_Plane], where: str) -> int:
+def _size_m(mask: Mask, frame: Frame) -> float:
+    """The longer side of its box at its median depth, metres; 0 of nothing."""
+    box, depths_m = bounding_box(mask), frame.depth_m[mask & (frame.depth_m > 0)]
+    if box is None or not len(depths_m):
+        return 0.0
+    return max(box.x1 - box.x0, box.y1 - box.y0) * float(np.median(depths_m)) / frame.intrinsics.fx
+
+
+def _nearest(labels: Labels, frame: Frame, planes: list[Plane], where: str) -> int:
     """The component nearest to the camera of those that stand on the plane, are wholly seen and of a plausible size."""
     if not planes:
         raise OnboardingError(f"{where}: there is no plane that things stand on; point at the thing, or put it on one")
@@ -239,6 +184,7 @@ def _with_rim(mask: Mask, depth_m: npt.NDArray[np.float32]) -> Mask:
     away_px, nearest = cv2.distanceTransformWithLabels(
         (~measured).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
     )
+    nearest = np.asarray(nearest, np.intp)
     of_mask = np.zeros(int(nearest.max()) + 1, bool)
     of_mask[nearest[mask & measured]] = True
     return mask | (of_mask[nearest] & (away_px <= RIM_PX))

@@ -36,9 +36,9 @@ ORDER = {
         "__main__",
     ),
     "reference": (
-        "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
-        "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "completion", "unposed",
-        "plate", "__main__",
+        "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "planes",
+        "segment", "fusion", "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "completion",
+        "unposed", "live", "plate", "__main__",
     ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}
