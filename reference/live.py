@@ -6,6 +6,8 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from reference.completion import MOST_VIEWS, Completion
 from reference.onboard import joined_model
 from reference.segment import segment
@@ -23,6 +25,9 @@ from tracker.symmetry import Symmetry
 logger = logging.getLogger(__name__)
 
 ENOUGH_COVERAGE = 0.6  # of the viewing sphere; a turn about a standing object shows 75 % of it
+# It starts from one view, whose pose gets worse the farther it is turned: the next ones are taken early, and where one
+# is refused another is soon tried.
+APART_RAD, AGAIN_RAD = np.radians(15), np.radians(5)
 PATIENCE = 30  # frames in which a thing may be found first: a camera's first ones are dark
 
 
@@ -81,7 +86,7 @@ class TurnedObject:
         first = centred(replace(frame, masks={}), mask, object_id, config)
         model = joined_model([first], backend, config.view, config.cloud, vocabulary, symmetry)
         self._views, self._coverage = views, coverage
-        self._completion = Completion(model, backend, config, views, symmetry)
+        self._completion = Completion(model, backend, config, views, symmetry, APART_RAD, AGAIN_RAD)
         self._tracker = ObjectTracker(model, config, backend)
         self._frames, self._source = 1, frame.provenance.source
         (result,) = self._tracker.step(replace(frame, masks={object_id: mask}))

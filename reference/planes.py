@@ -41,7 +41,7 @@ def planes_behind(points: Floats, meant: Floats | None, rng: np.random.Generator
         on = np.abs(plane.height_m(left)) < max(plane.thick_m, NEAR_PLANE_M)
         if on.sum() < least:
             break
-        through_several_things = len(planes) > 0 and plane.thick_m == MOST_THICK_M
+        through_several_things = plane.thick_m == MOST_THICK_M  # or a slice of something round
         before_it = meant is None or (plane.height_m(meant) > plane.thick_m).mean() >= LEAST_ABOVE
         if before_it and not through_several_things:
             planes.append(plane)
