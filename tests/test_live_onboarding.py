@@ -175,7 +175,7 @@ def test_what_ends_it_early_costs_nothing_that_is_known(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--at", "5,5"), "wide and not one thing"),
+        (("--at", "80,112"), "what is there"),
         (("--at", "over there"), "'over there' points nowhere; expected a pixel"),
         (("--at", "nearest", "--unposed"), "--unposed takes the source's masks"),
         (("--at", "nearest", "--coverage", "60"), "--coverage: expected a number from 0 to 1, got 60"),
