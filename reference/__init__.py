@@ -12,15 +12,29 @@ from reference.onboard import onboard, read_reference_frames
 
 if TYPE_CHECKING:
     from reference.completion import Completion
+    from reference.live import TurnedObject, first_sight
+    from reference.segment import segment
     from reference.unposed import onboard_unposed, read_unposed_frames
 
 _LATE = {
     "Completion": "reference.completion",
+    "TurnedObject": "reference.live",
+    "first_sight": "reference.live",
     "onboard_unposed": "reference.unposed",
     "read_unposed_frames": "reference.unposed",
+    "segment": "reference.segment",
 }
 
-__all__ = ["Completion", "onboard", "onboard_unposed", "read_reference_frames", "read_unposed_frames"]
+__all__ = [
+    "Completion",
+    "TurnedObject",
+    "first_sight",
+    "onboard",
+    "onboard_unposed",
+    "read_reference_frames",
+    "read_unposed_frames",
+    "segment",
+]
 
 
 def __getattr__(name: str) -> Any:

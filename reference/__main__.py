@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -14,12 +15,18 @@ from rich.table import Table
 from tracker.terminal import STDERR, hush, run, say_json
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from reference.live import Progress
     from tracker.concept import ConceptModel
     from tracker.config import TrackerConfig
     from tracker.frame import Frame, Mask
     from tracker.saliency import SaliencyBackend
     from tracker.sources import FrameSource
     from tracker.symmetry import Symmetry
+
+
+VIEWS = 2  # of a recording
 
 
 @dataclass
@@ -53,16 +60,24 @@ class Ask:
 
 @dataclass
 class Reference:
-    """Make a concept model from a few frames of a recording in which the object's pose is known, or --unposed."""
+    """Make a concept model from a few frames of a recording in which the object's pose is known, or --unposed, or from
+    a camera before which the object is turned."""
 
     source: tyro.conf.Positional[str]
-    """bop:PATH:SCENE, folder:PATH or synthetic:NAME."""
+    """bop:PATH:SCENE, folder:PATH or synthetic:NAME; or one that knows no objects, as realsense or rosbag:PATH: then
+    the object is turned before the camera, or the camera goes around it, until enough of it is known or at ctrl-C."""
     object: str
     """Which of the source's objects."""
     out: Path
     """File to write, for example mug.concept."""
-    views: Annotated[int, tyro.conf.arg(metavar="K")] = 2
-    """How many reference frames to pick from the recording."""
+    views: Annotated[int | None, tyro.conf.arg(metavar="K")] = None
+    """How many reference frames to pick from the recording, by default 2; of an object that is turned, how many at
+    most, by default 12."""
+    at: Annotated[str | None, tyro.conf.arg(metavar="X,Y[,X1,Y1]|nearest")] = None
+    """Of an object that is turned: where it is in the first frame, by a pixel on it, a box around it, or as the nearest
+    thing on the table, which is what a source without masks does by default. Masks and poses are not looked at then."""
+    coverage: float = 0.6
+    """Of an object that is turned: which share of the viewing sphere, within 60 degrees of a view, is enough."""
     unposed: bool = False
     """No poses are needed, and none are read: the tracker finds how the reference frames belong together. They are
     spread over the recording, and have to show enough of the same side; those that cannot be joined are named."""
@@ -105,10 +120,14 @@ class Reference:
         from tracker.sources import open_source
 
         hush(self.quiet or self.json)
-        if self.views < 1:
+        if self.views is not None and self.views < 1:
             raise ConfigError(f"--views: at least one reference frame is needed, got {self.views}")
         if not 0 <= self.least_confidence <= 1:
             raise ConfigError(f"--least-confidence: expected a number from 0 to 1, got {self.least_confidence:g}")
+        if not 0 <= self.coverage <= 1:
+            raise ConfigError(f"--coverage: expected a number from 0 to 1, got {self.coverage:g}")
+        if self.unposed and self.at is not None:
+            raise ConfigError("--unposed takes the source's masks, --at does without them: give one of the two")
         if self.vocabulary is not None and self.ask.category is not None:
             raise ConfigError("--vocabulary and --ask.category both name concepts: give one of them")
         plates = {show: self.out.with_suffix(f".{show}.png") for show in self.show}
@@ -118,7 +137,7 @@ class Reference:
         labels = read_vocabulary(self.vocabulary).for_object(self.object).labels if self.vocabulary else None
         backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
         source = open_source(self.source)
-        make = self._unposed if self.unposed else self._posed
+        make = self._turned if self._is_turned else self._unposed if self.unposed else self._posed
         model = make(source, backend, config, labels, symmetry)
         model.save(self.out)
         if "concepts" in plates:
@@ -139,7 +158,7 @@ class Reference:
     ) -> ConceptModel:
         from reference.onboard import onboard, read_reference_frames
 
-        frames = read_reference_frames(source, self.object, self.views)
+        frames = read_reference_frames(source, self.object, self.views or VIEWS)
         labels = labels or self.ask.labels(frames[0].frame, frames[0].mask)
         return onboard(frames, backend, config.view, config.cloud, labels, symmetry)
 
@@ -153,19 +172,64 @@ class Reference:
     ) -> ConceptModel:
         from reference.unposed import onboard_unposed, read_unposed_frames
 
-        frames = read_unposed_frames(source, self.object, self.views)
+        frames = read_unposed_frames(source, self.object, self.views or VIEWS)
         labels = labels or self.ask.labels(*frames[0])
         sure = self.least_confidence
         return onboard_unposed(frames, self.object, backend, config, labels, symmetry, least_confidence=sure)
+
+    def _turned(
+        self,
+        source: FrameSource,
+        backend: SaliencyBackend,
+        config: TrackerConfig,
+        labels: tuple[str, ...] | None,
+        symmetry: Symmetry | None,
+    ) -> ConceptModel:
+        from contextlib import ExitStack
+
+        from reference.completion import MOST_VIEWS
+        from reference.live import TurnedObject, first_sight
+        from reference.onboard import warn_of_problems
+        from tracker.errors import TrackerError
+        from tracker.in_order import InOrder
+        from tracker.latest import Latest
+        from tracker.pointing import parse_pointer
+        from tracker.sources import LiveSource
+
+        there = None if self.at in (None, "nearest") else parse_pointer(self.at)
+        live, views = isinstance(source, LiveSource), self.views or MOST_VIEWS
+        with ExitStack() as stack:
+            coming = stack.enter_context(Latest(source)) if isinstance(source, LiveSource) else source
+            frames = iter(InOrder(coming, live=live))
+            frame, mask = first_sight(frames, there)
+            labels = labels or self.ask.labels(frame, mask)
+            turned = TurnedObject(frame, mask, self.object, backend, config, labels, symmetry, views, self.coverage)
+            show = stack.enter_context(_sphere_bar(self.object, self.coverage))
+            try:
+                show(turned.progress)
+                while not turned.progress.enough and (frame := next(frames, None)) is not None:
+                    show(turned.see(frame))
+            except KeyboardInterrupt:
+                STDERR.print("stopped; what is known of the object by now is kept")
+            except TrackerError as error:  # a camera that goes away does not cost what it has shown
+                STDERR.print(f"{error}; what is known of the object by now is kept", markup=False)
+        warn_of_problems(turned.model)
+        return turned.model
+
+    @property
+    def _is_turned(self) -> bool:
+        from tracker.sources import WITHOUT_MASKS, kind_of
+
+        return self.at is not None or (kind_of(self.source) in WITHOUT_MASKS and not self.unposed)
 
     def _symmetry(self) -> Symmetry | None:
         from tracker.declared_symmetry import parse_symmetry
         from tracker.errors import ConfigError
 
-        if self.unposed and self.symmetry not in ("auto", "none"):
+        if (self.unposed or self._is_turned) and self.symmetry not in ("auto", "none"):
             raise ConfigError(
-                f"--symmetry {self.symmetry} is about the object's own axes, which nobody knows with --unposed: "
-                "expected auto or none"
+                f"--symmetry {self.symmetry} is about the object's own axes, which nobody knows "
+                f"{'with --unposed' if self.unposed else 'of an object that is turned'}: expected auto or none"
             )
         return None if self.symmetry == "auto" else parse_symmetry(self.symmetry)
 
@@ -183,12 +247,37 @@ def _facts(model: ConceptModel, path: Path) -> dict[str, object]:
     }
 
 
+@contextmanager
+def _sphere_bar(name: str, coverage: float) -> Iterator[Callable[[Progress], None]]:
+    """Shows how much of the viewing sphere is known, as a bar on a terminal, else in a line for each new view."""
+    from rich.progress import BarColumn, TextColumn
+    from rich.progress import Progress as Bar
+
+    hidden = not STDERR.is_terminal
+    text = TextColumn("{task.percentage:.0f} % of the way to {task.fields[wanted]}; {task.fields[said]}")
+    with Bar(
+        TextColumn(name), BarColumn(), text, console=STDERR, transient=True, disable=not STDERR.is_terminal
+    ) as bar:
+        task = bar.add_task("", total=max(coverage, 1e-9), wanted=f"{coverage:.0%} of the viewing sphere", said="")
+
+        def show(now: Progress) -> None:
+            state = now.result.state.value if now.result.pose else f"{now.result.state.value}: {now.result.reason}"
+            said = f"{now.views} views, {state}"
+            bar.update(task, completed=now.coverage, said=said)
+            if now.grown and hidden:
+                STDERR.print(f"{now.views} views, {now.coverage:.0%} of the viewing sphere")
+
+        yield show
+
+
 def _verdict(model: ConceptModel, path: Path) -> Table:
     quality = model.notes["quality"]
     table = Table("", "", title=f"{path}", show_header=False)
     table.add_row("object", model.object_id)
     table.add_row("backend", f"{model.backend}, {len(model.labels)} concepts")
     table.add_row("reference frames", "\n".join(model.notes["reference_frames"]))
+    if "came_about" in model.notes:
+        table.add_row("came about", model.notes["came_about"])
     if "object_frame" in model.notes:
         table.add_row("left out", "\n".join(model.notes["left_out"]) or "nothing")
         table.add_row("object frame", model.notes["object_frame"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
+from typing import Literal
 
 import numpy as np
 
@@ -13,15 +14,16 @@ from reference.viewsphere import view_direction
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import Frame, Mask, PosedFrame
-from tracker.geometry import Pose
+from tracker.geometry import Floats, Pose
 from tracker.result import TrackResult
 from tracker.saliency import SaliencyBackend
+from tracker.symmetry import Symmetry
 
 logger = logging.getLogger(__name__)
 
 MOST_VIEWS = 12
 LEAST_CONFIDENCE = 0.9  # of a pose by which a frame joins
-APART_RAD = np.radians(20)  # from every view that the model is made of, and from those that it refused
+APART_RAD = np.radians(20)  # from every view that the model is made of, and from those that it refused, by default
 WATCHED, MOST_FALLEN = 15, 0.15  # results before and after a frame joined, and how far their mean confidence may fall
 
 
@@ -30,7 +32,12 @@ class Completion:
     those that it is made of, and that contradict none of them. Where the tracker is less sure of its poses afterwards,
     the frame is taken out again.
 
-    model: the last one. refused: frames that did not join or were taken out, by name and with the reason.
+    symmetry: of the object; None looks for it in every model anew, as a few views may not show it. Unless it is given,
+    it is that of the first model. apart_rad: how far from all views a frame has to be seen to join them. again_rad: the
+    same for frames that were refused.
+
+    model: the last one. views: that it is made of. proven: no frame has joined so lately that it may be taken out
+    again. refused: frames that did not join or were taken out, by name and with the reason.
     """
 
     def __init__(
@@ -39,12 +46,17 @@ class Completion:
         backend: SaliencyBackend,
         config: TrackerConfig | None = None,
         most_views: int = MOST_VIEWS,
+        symmetry: Symmetry | Literal["as it is"] | None = "as it is",
+        apart_rad: float = APART_RAD,
+        again_rad: float = APART_RAD,
     ) -> None:
         config = (config or TrackerConfig()).model_copy(update={"prior": False, "masks": "given"})
-        self._registration = Registration(backend, config, model.labels, model.symmetry, LEAST_CONFIDENCE)
+        symmetry = model.symmetry if symmetry == "as it is" else symmetry
+        self._registration = Registration(backend, config, model.labels, symmetry, LEAST_CONFIDENCE)
         self._growing = GrowingModel(self._registration, model.references, model)
         self._most_views = most_views
-        self._seen_from = list(model.view_directions)
+        self._apart_rad, self._again_rad = apart_rad, again_rad
+        self._refused_from: list[Floats] = []
         self._before: deque[float] = deque(maxlen=WATCHED)
         self._since: list[float] = []
         self._smaller: GrowingModel | None = None
@@ -52,6 +64,14 @@ class Completion:
     @property
     def model(self) -> ConceptModel:
         return self._growing.model
+
+    @property
+    def views(self) -> int:
+        return len(self._growing.frames)
+
+    @property
+    def proven(self) -> bool:
+        return self._smaller is None
 
     @property
     def refused(self) -> tuple[str, ...]:
@@ -67,8 +87,8 @@ class Completion:
         if not self._teaches(result.raw_pose, result.mask, result.confidence):
             return None
         smaller = self._growing.copy()
-        self._seen_from.append(view_direction(result.raw_pose))
         if not self._growing.join(PosedFrame(frame, result.object_id, result.raw_pose, result.mask)):
+            self._refused_from.append(view_direction(result.raw_pose))
             return None
         logger.info("the model of object %r grows by %s", result.object_id, name_of(frame))
         self._smaller, self._since = smaller, []
@@ -76,9 +96,11 @@ class Completion:
 
     def _teaches(self, T_cam_obj: Pose, mask: Mask, confidence: float) -> bool:
         """Whether it is surely there, and a side is seen that the model may not know."""
-        cosines = np.array(self._seen_from) @ view_direction(T_cam_obj)
-        elsewhere = len(self._growing.frames) < self._most_views and bool((cosines < np.cos(APART_RAD)).all())
-        return elsewhere and confidence >= LEAST_CONFIDENCE and int(mask.sum()) >= LEAST_VISIBLE_PX
+        here = view_direction(T_cam_obj)
+        known = (self._growing.model.view_directions @ here > np.cos(self._apart_rad)).any()
+        tried = any(refused @ here > np.cos(self._again_rad) for refused in self._refused_from)
+        elsewhere = len(self._growing.frames) < self._most_views and not known and not tried
+        return bool(elsewhere) and confidence >= LEAST_CONFIDENCE and int(mask.sum()) >= LEAST_VISIBLE_PX
 
     def _watched(self, confidence: float) -> ConceptModel | None:
         """The way back."""
@@ -90,6 +112,7 @@ class Completion:
         if smaller is None or fallen <= MOST_FALLEN:
             return None
         taken_out = self._growing.frames[-1].frame
+        self._refused_from.append(view_direction(self._growing.frames[-1].T_cam_obj))
         smaller.left_out.append(f"{name_of(taken_out)}: with it, poses are less sure by {fallen:.2f}")
         logger.info("the model of object %r is the smaller one again: %s", self.model.object_id, smaller.left_out[-1])
         self._growing = smaller

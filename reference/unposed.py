@@ -52,6 +52,13 @@ def read_unposed_frames(source: FrameSource, object_id: str, views: int) -> list
     return chosen
 
 
+def centred(frame: Frame, mask: Mask, object_id: str, config: TrackerConfig) -> PosedFrame:
+    """With the pose that sets an object frame: the centre of the points that it shows, with the camera's axes. Raises
+    OnboardingError where it shows too little."""
+    here = PosedFrame(frame, object_id, Pose.identity(), mask)
+    return replace(here, T_cam_obj=Pose(np.eye(3), surface_of(here, config.view, config.cloud).mean(axis=0)))
+
+
 def onboard_unposed(
     frames: Sequence[tuple[Frame, Mask]],
     object_id: str,
@@ -76,9 +83,7 @@ def onboard_unposed(
         raise OnboardingError("onboarding needs at least one reference frame")
     config = (config or TrackerConfig()).model_copy(update={"prior": False, "masks": "given"})
     (frame, mask), given = frames[0], T_cam_obj is not None
-    first = PosedFrame(frame, object_id, T_cam_obj or Pose.identity(), mask)
-    if not given:
-        first = replace(first, T_cam_obj=Pose(np.eye(3), surface_of(first, config.view, config.cloud).mean(axis=0)))
+    first = PosedFrame(frame, object_id, T_cam_obj, mask) if T_cam_obj else centred(frame, mask, object_id, config)
     registration = Registration(backend, config, vocabulary, symmetry, least_confidence)
     growing = GrowingModel(registration, [first], registration.model([first]))
     growing.take([PosedFrame(frame, object_id, Pose.identity(), mask) for frame, mask in frames[1:]])

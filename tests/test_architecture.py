@@ -36,9 +36,9 @@ ORDER = {
         "saved_run", "overlay", "video", "viewer", "web", "rerun_log", "terminal", "__main__",
     ),
     "reference": (
-        "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "fusion",
-        "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "completion", "unposed",
-        "sheet", "plate", "view_plate", "__main__",
+        "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "planes",
+        "segment", "fusion", "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "completion",
+        "unposed", "live", "sheet", "plate", "view_plate", "__main__",
     ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}

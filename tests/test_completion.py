@@ -110,6 +110,23 @@ def test_a_wrong_pose_contradicts_and_is_refused_with_the_reason(
     assert completion.model is one_sided
 
 
+@pytest.mark.parametrize(("again_deg", "refusals"), [(20, 1), (2, 2)])
+def test_what_was_refused_is_tried_again_from_as_far_as_asked_for(
+    again_deg: float,
+    refusals: int,
+    one_sided: ConceptModel,
+    attributes: SaliencyBackend,
+    followed: list[tuple[Frame, TrackResult]],
+) -> None:
+    """Two wrong poses, 4 degrees apart."""
+    completion = Completion(one_sided, attributes, again_rad=np.radians(again_deg))
+    for frame, result in followed[-2:]:
+        assert result.raw_pose is not None
+        turned = result.raw_pose @ Pose(about(np.array([0.0, 0.0, 1.0]), 0.5), np.zeros(3))
+        assert completion.consider(frame, replace(result, raw_pose=turned)) is None
+    assert len(completion.refused) == refusals
+
+
 def test_where_poses_are_less_sure_afterwards_the_frame_is_taken_out_again(
     one_sided: ConceptModel, attributes: SaliencyBackend, followed: list[tuple[Frame, TrackResult]]
 ) -> None:

@@ -1,0 +1,191 @@
+"""An object that is turned before a camera becomes a model, without a mask or a pose of the source."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import reference.__main__
+import reference.live
+import tracker.sources
+from reference.live import PATIENCE, Progress, TurnedObject, first_sight
+from tests.live_camera import LiveCamera
+from tracker.concept import ConceptModel
+from tracker.errors import OnboardingError, SourceError
+from tracker.frame import Frame, Mask
+from tracker.pipeline import ObjectTracker
+from tracker.pointing import Pointer
+from tracker.saliency import SaliencyBackend
+from tracker.sources.synthetic import SyntheticScene, open_scene
+
+BOX = "tea_box"
+SOURCE = f"synthetic:turn?size=160x120&frames=6&object={BOX}"
+Run = Callable[..., tuple[int, str]]
+Turned = tuple[TurnedObject, list[Progress]]
+
+
+@pytest.fixture(scope="module")
+def scene() -> SyntheticScene:
+    """A box turns by 114 degrees."""
+    return open_scene(f"turn?object={BOX}&size=320x240")
+
+
+@pytest.fixture(scope="module")
+def turned(scene: SyntheticScene, attributes: SaliencyBackend) -> Turned:
+    """Every third frame, masks taken away; 27 % of the viewing sphere are enough."""
+    frames = (replace(scene[index], masks={}) for index in range(0, 72, 3))
+    there = first_sight(frames, None)
+    turned = TurnedObject(*there, BOX, attributes, coverage=0.27)
+    return turned, [turned.progress, *(turned.see(frame) for frame in frames)]
+
+
+def test_the_model_holds_more_of_the_object_at_poses_that_are_right(turned: Turned, scene: SyntheticScene) -> None:
+    model = turned[0].model
+    assert len(model.references) >= 2
+    truth = {sighting.index: sighting.T_cam_obj for sighting in scene.sightings(BOX)}
+    first = model.references[0]
+    T_true_obj = truth[first.frame.index].inverse() @ first.T_cam_obj
+    for view in model.references:
+        assert not view.frame.masks
+        expected = truth[view.frame.index] @ T_true_obj
+        assert view.T_cam_obj.distance_to_m(expected) < 0.003
+        assert np.degrees(view.T_cam_obj.angle_to_rad(expected)) < 3
+
+
+def test_its_notes_say_how_it_came_about(turned: Turned, tmp_path: Path) -> None:
+    turned[0].model.save(tmp_path / "a.concept")
+    notes = ConceptModel.load(tmp_path / "a.concept").notes
+    assert notes["came_about"].startswith("turned before the camera, 24 frames from synthetic:turn")
+    assert notes["object_frame"].startswith("centre of what the first")
+    assert notes["left_out"] == []
+
+
+def test_coverage_grows_with_the_views_until_it_is_enough(turned: Turned) -> None:
+    progress = turned[1]
+    assert (progress[0].views, progress[0].grown, progress[0].enough) == (1, False, False)
+    assert all(now.result.pose is not None for now in progress)
+    for before, now in pairwise(progress):
+        assert now.coverage >= before.coverage
+        assert now.grown == (now.views > before.views) == (now.coverage > before.coverage)
+    first = next(k for k, now in enumerate(progress) if now.grown)
+    done = next(k for k, now in enumerate(progress) if now.enough)
+    assert progress[first].coverage >= 0.27
+    assert done > first + 10  # a view that joined has to prove itself
+
+
+def test_the_model_tracks_the_object_afterwards(turned: Turned, scene: SyntheticScene) -> None:
+    model, truth = turned[0].model, scene.sightings(BOX)
+    follow = ObjectTracker(model)
+    T_true_obj = truth[0].T_cam_obj.inverse() @ model.references[0].T_cam_obj
+    for index in (76, 80, 84):
+        (result,) = follow.step(scene[index])
+        assert result.pose is not None
+        assert result.pose.distance_to_m(truth[index].T_cam_obj @ T_true_obj) < 0.003
+
+
+def test_so_many_views_are_enough(scene: SyntheticScene, attributes: SaliencyBackend) -> None:
+    frame = scene[0]
+    assert TurnedObject(frame, frame.masks[BOX], BOX, attributes, views=1).progress.enough
+
+
+def test_a_camera_may_begin_with_frames_that_show_nothing(scene: SyntheticScene) -> None:
+    dark = replace(scene[0], depth_m=np.zeros_like(scene[0].depth_m))
+    frame, mask = first_sight(iter([dark, dark, scene[0], scene[1]]), None)
+    assert frame is scene[0] or frame.index == 0
+    assert mask.any()
+    frames = iter([dark] * (PATIENCE + 5))
+    with pytest.raises(OnboardingError, match="0 pixels have depth"):
+        first_sight(frames, None)
+    assert len(list(frames)) == 5
+    with pytest.raises(OnboardingError, match="there are no frames"):
+        first_sight(iter([]), None)
+
+
+# The command
+
+
+@pytest.fixture
+def run(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """`python -m reference` in this process: its exit code and what it says."""
+
+    def call(source: str, *options: object) -> tuple[int, str]:
+        out = ("--object", "box", "--out", str(tmp_path / "box.concept"))
+        monkeypatch.setattr(sys, "argv", ["reference", source, *out, *map(str, options)])
+        try:
+            reference.__main__.main()
+            code = 0
+        except SystemExit as ending:
+            code = int(ending.code or 0)
+        return code, " ".join(str(capsys.readouterr().err).split())
+
+    return call
+
+
+@pytest.fixture
+def camera(scene: SyntheticScene, monkeypatch: pytest.MonkeyPatch) -> LiveCamera:
+    """What every source's name opens; it has shown a frame."""
+    live = LiveCamera().show(scene[0])
+    monkeypatch.setattr(tracker.sources, "open_source", lambda _: live)
+    return live
+
+
+def test_a_recording_without_masks_is_read_to_its_end(run: Run, tmp_path: Path) -> None:
+    code, said = run(SOURCE, "--at", "nearest")
+    assert code == 0, said
+    assert "turned before the camera, 6 frames" in said
+    assert "viewing sphere" in said
+    model = ConceptModel.load(tmp_path / "box.concept")
+    assert model.object_id == "box"
+    assert len(model.references) == 1
+
+
+def test_a_camera_needs_nothing_said(run: Run, camera: LiveCamera, tmp_path: Path) -> None:
+    camera.show(None)
+    code, said = run("realsense", "--views", 1)
+    assert code == 0, said
+    assert (tmp_path / "box.concept").exists()
+
+
+@pytest.mark.parametrize("ending", [KeyboardInterrupt(), SourceError("camera:7: the camera is gone for 60.0 s")])
+def test_what_ends_it_early_costs_nothing_that_is_known(
+    ending: BaseException, run: Run, camera: LiveCamera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ended(frames: Iterator[Frame], there: Pointer | None) -> tuple[Frame, Mask]:
+        first = first_sight(frames, there)
+        camera.show(replace(first[0], stamp_ns=first[0].stamp_ns + 1))
+        return first
+
+    def see(*_: object) -> Progress:
+        raise ending
+
+    monkeypatch.setattr(reference.live, "first_sight", ended)
+    monkeypatch.setattr(TurnedObject, "see", see)
+    code, said = run("realsense")
+    assert code == 0, said
+    assert "what is known of the object by now is kept" in said
+    assert ConceptModel.load(tmp_path / "box.concept").object_id == "box"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--at", "80,112"), "what is there"),
+        (("--at", "over there"), "'over there' points nowhere; expected a pixel"),
+        (("--at", "nearest", "--unposed"), "--unposed takes the source's masks"),
+        (("--at", "nearest", "--coverage", "60"), "--coverage: expected a number from 0 to 1, got 60"),
+        (("--at", "nearest", "--symmetry", "z:inf"), "nobody knows of an object that is turned"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_leaves_no_file(
+    options: tuple[str, ...], words: str, run: Run, tmp_path: Path
+) -> None:
+    code, said = run(SOURCE, *options)
+    assert code == 1
+    assert words in said
+    assert list(tmp_path.iterdir()) == []
