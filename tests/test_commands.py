@@ -766,7 +766,7 @@ def test_a_plate_of_a_failure_is_the_first_one_in_the_run_or_of_the_frame_that_i
 ) -> None:
     folder = tmp_path / "out"
     settings = tmp_path / "strict.yaml"
-    settings.write_text("accept: 0.9999")
+    settings.write_text("believe: 1.0")
     what = (SOURCE, "--model", model, "--out", folder, "--quiet", "--config", settings)
     assert run("tracker", *what).code == 0
     assert run("eval", "plate", "failure", folder, "--frame", 2, "--quiet") == Said(0, "", "")
