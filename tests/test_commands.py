@@ -249,7 +249,13 @@ def test_tracker_writes_the_formats_of_the_field_with_the_same_smoothed_poses(
     line = ("tracker", SOURCE, "--model", model, "--smooth", "offline", "--out", tmp_path / "out")
     said = run(*line, "--write", "ob-in-cam", "tum")
     assert (said.code, said.out) == (0, ""), said.err
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"poses.jsonl", "config.yaml", "ob_in_cam", "tum"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "poses.jsonl",
+        "config.yaml",
+        "run.json",
+        "ob_in_cam",
+        "tum",
+    }
     lines = [json.loads(each) for each in (tmp_path / "out" / "poses.jsonl").read_text().splitlines()]
     matrices = [np.loadtxt(path) for path in sorted((tmp_path / "out" / "ob_in_cam").iterdir())]
     rows = np.loadtxt(tmp_path / "out" / "tum" / f"{BOX}.txt")
@@ -285,14 +291,14 @@ def test_results_are_replaced_only_when_it_is_asked_for(model: Path, run: Run, f
     assert_refused(run(*line), "holds results already", "--overwrite")
     assert content(filled) == {"precious.txt": b"of last week"}
     assert run(*line, "--overwrite").code == 0
-    assert set(content(filled)) == {"poses.jsonl", "config.yaml"}
+    assert set(content(filled)) == {"poses.jsonl", "config.yaml", "run.json"}
     assert [path.name for path in filled.parent.iterdir()] == ["filled"]
 
 
 def test_an_empty_folder_holds_no_results(model: Path, run: Run, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     assert run("tracker", SOURCE, "--model", model, "--out", tmp_path / "empty").code == 0
-    assert set(content(tmp_path / "empty")) == {"poses.jsonl", "config.yaml"}
+    assert set(content(tmp_path / "empty")) == {"poses.jsonl", "config.yaml", "run.json"}
 
 
 @pytest.mark.parametrize(

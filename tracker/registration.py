@@ -18,7 +18,7 @@ from tracker.threads import one_thread
 from tracker.umeyama import Motions, no_motions
 
 FIRST_BATCH = 8192  # samples before the first look at whether more are needed; every further batch is twice as large
-REFITS, SETTLED = 10, 2e-4  # at most so many, or until no entry of a rotation changes by more
+REFITS, SETTLED = 15, 1e-4  # at most so many, or until no entry of a rotation changes by more
 STARTS = 8  # best hypotheses that are fitted whether or not they are alike
 
 
