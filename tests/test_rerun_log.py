@@ -97,11 +97,11 @@ def recorded(path: Path, model: ConceptModel, results: Sequence[TrackResult], tr
 
 def plain(batch: Any) -> list[dict[str, Any]]:
     """Rows of Arrow's, times as whole nanoseconds: Python's own have no more than microseconds."""
-    import pyarrow
+    import pyarrow as pa
 
-    times = pyarrow.types.is_temporal
-    columns = [column.cast(pyarrow.int64()) if times(column.type) else column for column in batch.columns]
-    return pyarrow.RecordBatch.from_arrays(columns, names=batch.schema.names).to_pylist()
+    times = pa.types.is_temporal
+    columns = [column.cast(pa.int64()) if times(column.type) else column for column in batch.columns]
+    return pa.RecordBatch.from_arrays(columns, names=batch.schema.names).to_pylist()
 
 
 def stamps(rows: Sequence[dict[str, Any]], component: str) -> list[int]:
