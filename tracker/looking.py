@@ -20,9 +20,9 @@ from tracker.view import ObjectView, view_object
 
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
 MOST_TRIED = 64  # poses that are remembered
-# What is seen again has to end where it should, and most of it has to be in sight: else it may be a patch of a wall, or
-# a can that stands in a table up to its lid.
-LEAST_ENDS, MOST_HIDDEN = 0.7, 0.5
+# What is seen again has to end where its outline does or to show much of itself, and most of what faces the camera has to
+# be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
+LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
 STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
 
 T = TypeVar("T")
@@ -79,7 +79,8 @@ def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeG
         return False
     if found.masked or (followed and found.hypothesis.origin != "search"):
         return found.confidence >= config.believe
-    if found.hypothesis.evidence.explained < LEAST_ENDS or found.hypothesis.evidence.hidden > MOST_HIDDEN:
+    seen = found.hypothesis.evidence
+    if seen.hidden > MOST_HIDDEN or (seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED):
         return False
     return found.confidence >= (config.sure if found.grounds.turn_rad is None else config.regain)
 
