@@ -20,8 +20,8 @@ from tracker.view import ObjectView, view_object
 
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
 MOST_TRIED = 64  # poses that are remembered
-# What is seen again has to end where its outline does or to show much of itself, and most of what faces the camera has to
-# be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
+# What is seen again has to end where its outline does or to show much of itself, and most of what faces the camera has
+# to be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
 LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
 STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
 
