@@ -60,7 +60,8 @@ class Group:
 
     def trace(self, origins: Float32s, directions: Float32s) -> Hits:
         found = self._scene.cast_rays(np.concatenate((origins, directions), axis=1))
-        distance, face = found["t_hit"].numpy(), found["primitive_ids"].numpy()
+        # Copied: Open3D ends a program that still holds its memory at exit with status 1.
+        distance, face = found["t_hit"].numpy().copy(), found["primitive_ids"].numpy()
         missed = ~np.isfinite(distance)
         face = np.where(missed, 0, face)
         u, v = found["primitive_uvs"].numpy().T[..., None]
@@ -73,7 +74,7 @@ class Group:
         return Hits(distance, owner, normals, values[:, 3:], np.take(self._texel_m, face))
 
     def occluded(self, origins: Float32s, directions: Float32s) -> npt.NDArray[np.bool_]:
-        return self._scene.test_occlusions(np.concatenate((origins, directions), axis=1), 0.0, 1.0).numpy()
+        return self._scene.test_occlusions(np.concatenate((origins, directions), axis=1), 0.0, 1.0).numpy().copy()
 
 
 def dot(a: Float32s, b: Float32s, columns: int = 3) -> Float32s:
