@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tracker.concept import ConceptModel
-from tracker.confidence import confidence
+from tracker.confidence import Grounds, confidence
 from tracker.config import TrackerConfig
 from tracker.frame import Frame
 from tracker.geometry import Pose
-from tracker.looking import Found, Look, Looking
+from tracker.looking import Found, Look, Looking, believed, doubt
+from tracker.refinement import Refined
 from tracker.saliency import Query, SaliencyBackend
+from tracker.search import Hypothesis
 from tracker.sources.synthetic import SyntheticScene
 from tracker.stopwatch import Stopwatch
+from tracker.verification import Evidence
+from tracker.view import ObjectView
 
 CAN = "soup_can"
 
@@ -119,3 +125,53 @@ def test_what_is_far_from_where_it_was_expected_is_less_likely(
     assert near.grounds.evidence == surprising.grounds.evidence
     assert near.confidence == confidence(near.grounds) > surprising.confidence
     assert surprising.grounds.turn_rad == pytest.approx(1.0, abs=0.1)
+
+
+GOOD = Evidence(
+    score=0.6, surface=0.9, colour=0.8, seen_through=0.0, outside=0.0, hidden=0.0, explained=0.9, proved=0.8
+)
+WALL = replace(GOOD, surface=0.78, hidden=0.07, explained=0.6, proved=0.37)  # behind a can's lid
+TABLE = replace(GOOD, surface=0.74, hidden=0.57, explained=0.75, proved=0.33)  # around a can's lid
+CUP = replace(GOOD, explained=0.62, proved=0.66)  # of which the inside is not known
+AIR = replace(GOOD, surface=0.1)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "confidence", "how", "said"),
+    [
+        (GOOD, 0.15, "masked", ""),
+        (GOOD, 0.05, "masked", "right at 5%"),
+        (AIR, 0.9, "masked", "10% of what should be seen"),
+        (WALL, 0.15, "followed", ""),
+        (WALL, 0.15, "turned", ""),
+        (AIR, 0.9, "followed", "10% of what should be seen"),
+        (GOOD, 0.35, "jumped", ""),
+        (GOOD, 0.25, "jumped", "right at 25%"),
+        (GOOD, 0.35, "expected", ""),
+        (GOOD, 0.25, "expected", "right at 25%"),
+        (GOOD, 0.55, "anywhere", ""),
+        (GOOD, 0.45, "anywhere", "right at 45%"),
+        (CUP, 0.55, "anywhere", ""),
+        (WALL, 0.8, "anywhere", "goes on beyond it"),
+        (WALL, 0.8, "expected", "goes on beyond it"),
+        (TABLE, 0.8, "anywhere", "57% of it would be hidden"),
+    ],
+)
+def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
+    evidence: Evidence, confidence: float, how: str, said: str, can_view: ObjectView
+) -> None:
+    origin = {"followed": "prediction", "turned": "turn"}.get(how, "search")
+    refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
+    grounds = Grounds(evidence, 0.01, None if how == "anywhere" else 0.02)
+    found = Found(Hypothesis(refined, evidence, origin, can_view), grounds, confidence, how == "masked")
+    followed, config = how in ("followed", "turned", "jumped"), TrackerConfig()
+    assert believed(found, followed, config) == (not said)
+    assert said in doubt(found, followed, config)
+    assert bool(doubt(found, followed, config)) == bool(said)
+
+
+def test_what_did_not_even_show_at_the_first_place_is_said_for_that(can_view: ObjectView) -> None:
+    refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
+    found = Found(Hypothesis(refined, AIR, "search", can_view), Grounds(AIR, 0.01), 0.9, masked=False, missed="hidden")
+    assert doubt(found, False, TrackerConfig()) == "hidden"
+    assert doubt("out of view", True, TrackerConfig()) == "out of view"

@@ -8,7 +8,7 @@ import pytest
 from tracker.errors import ConfigError
 from tracker.frame import Frame
 from tracker.geometry import Intrinsics
-from tracker.pointing import Click, clicked_m, measured_in, parse_pointer
+from tracker.pointing import Click, clicked_m, measured_in, parse_pointer, parse_pointers
 from tracker.view import Box
 
 CAMERA = Intrinsics(50.0, 50.0, 31.5, 23.5, 64, 48)
@@ -27,6 +27,13 @@ def test_what_is_written_is_a_click_or_a_box() -> None:
 def test_what_points_nowhere_is_refused(text: str) -> None:
     with pytest.raises(ConfigError, match="points nowhere"):
         parse_pointer(text)
+
+
+def test_an_object_has_a_name_unless_it_is_the_only_one() -> None:
+    assert parse_pointers(["3,4"], ["mug"]) == {"mug": Click(3, 4)}
+    assert parse_pointers(["mug=3,4", "a=b=1,2,3,4"], ["mug", "a=b"]) == {"mug": Click(3, 4), "a=b": Box(1, 2, 3, 4)}
+    with pytest.raises(ConfigError, match=r"of which object.* mug, can"):
+        parse_pointers(["3,4"], ["mug", "can"])
 
 
 def test_a_box_holds_its_pixels_that_have_depth() -> None:

@@ -133,3 +133,5 @@ def test_what_fails_in_the_worker_is_raised_in_the_next_step(can_model: ConceptM
     worker.work()
     with pytest.raises(ConfigError, match="1 pictures are too many"):
         tracker.step(can_frames[1])
+    (result,) = tracker.step(can_frames[2])  # once: the next one is asked anew
+    assert result.reason == "its concepts are not known yet"

@@ -76,7 +76,7 @@ def test_a_turn_about_its_axis_that_the_shape_allows_is_undone_by_the_paint(
     slid = can_search.continued(wrong, can_sight, Stopwatch())
     assert slid is not None
     assert slid.refined.T_cam_obj.angle_to_rad(can_truth) > 0.3
-    assert_found(best([slid, *can_search.turned(slid, can_sight, Stopwatch())]), can_truth, "search")
+    assert_found(best([slid, *can_search.turned(slid, can_sight, Stopwatch())]), can_truth, "turn")
 
 
 def test_without_concepts_it_goes_on_from_where_it_is_expected(

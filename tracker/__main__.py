@@ -16,12 +16,11 @@ from rich.table import Table
 from tracker.terminal import ALWAYS, STDERR, hush, progress, run
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from tracker.concept import ConceptModel
     from tracker.config import TrackerConfig
     from tracker.pipeline import ObjectTracker
-    from tracker.pointing import Pointer
     from tracker.remote_control import RemoteControl
     from tracker.result import TrackResult
     from tracker.sources import FrameSource
@@ -96,6 +95,7 @@ class Track:
         from tracker.latest import Latest
         from tracker.output import PoseLines, PoseOutput, result_folder
         from tracker.pipeline import ObjectTracker
+        from tracker.pointing import parse_pointers
         from tracker.pose_files import open_pose_files
         from tracker.remote_control import RemoteControl
         from tracker.ros_results import PosePublisher
@@ -113,7 +113,7 @@ class Track:
         regions = {model.object_id: {c: model.locate(c, backend) for c in self.locate} for model in models}
         source = self._opened_source()
         live = Latest(source) if isinstance(source, LiveSource) else None
-        pointed_out = dict(self._pointers(models))
+        pointed_out = parse_pointers(self.at, [model.object_id for model in models])
         summary, first_masks = _Summary(), FirstMasks(pointed_out)
         failure: TrackerError | None = None
         with ExitStack() as stack:
@@ -174,18 +174,6 @@ class Track:
         if failure:
             raise failure
         STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
-
-    def _pointers(self, models: Sequence[ConceptModel]) -> Iterator[tuple[str, Pointer]]:
-        """Raises ConfigError where it is not clear which object is meant, or where it is."""
-        from tracker.errors import ConfigError
-        from tracker.pointing import parse_pointer
-
-        for text in self.at:
-            name, separator, there = text.rpartition("=")
-            if not separator and len(models) > 1:
-                known = ", ".join(model.object_id for model in models)
-                raise ConfigError(f"--at {text}: of which object? Write NAME={text}, NAME one of {known}")
-            yield name if separator else models[0].object_id, parse_pointer(there)
 
     def _viewer(self, folder: Path | None, models: Sequence[ConceptModel]) -> Viewer:
         """Raises as `RerunLog` does, and OutputError where its file is there already."""

@@ -72,28 +72,31 @@ class Attempt:
 
 
 def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeGuard[Found]:
-    """A pose has to be likely. Where nobody says which pixels are the object's, less is asked where it was expected
-    while it is followed than of what is seen again or has jumped, so that a state does not flicker; and most where
-    nothing was expected."""
-    if isinstance(found, str) or found.hypothesis.evidence.surface < LEAST_SURFACE:
-        return False
-    if found.masked or (followed and found.hypothesis.origin != "search"):
-        return found.confidence >= config.believe
-    seen = found.hypothesis.evidence
-    if seen.hidden > MOST_HIDDEN or (seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED):
-        return False
-    return found.confidence >= (config.sure if found.grounds.turn_rad is None else config.regain)
+    """Whether `doubt` has nothing to say."""
+    return not doubt(found, followed, config)
 
 
-def why_not(found: Found | str) -> str:
-    """Why it is not believed."""
+def doubt(found: Found | str, followed: bool, config: TrackerConfig) -> str:
+    """Why it is not believed, in words; empty where it is."""
     if isinstance(found, str):
         return found
-    if found.missed:
-        return found.missed
-    if found.hypothesis.evidence.surface < LEAST_SURFACE:
-        return f"poor fit: {found.hypothesis.evidence.surface:.0%} of what should be seen is in place"
-    return f"poor fit: the best pose is right at {found.confidence:.0%}"
+    lacking = _lacking(found, followed, config)
+    return lacking and (found.missed or f"poor fit: {lacking}")
+
+
+def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
+    """What a pose lacks. It has to be likely. Where nobody says which pixels are the object's, less is asked where it
+    was expected while it is followed than of what is seen again or has jumped, so that a state does not flicker; and
+    most where nothing was expected."""
+    seen, goes_on = found.hypothesis.evidence, found.masked or (followed and found.hypothesis.origin != "search")
+    if seen.surface < LEAST_SURFACE:
+        return f"{seen.surface:.0%} of what should be seen is in place"
+    if not goes_on and seen.hidden > MOST_HIDDEN:
+        return f"at the best pose {seen.hidden:.0%} of it would be hidden"
+    if not goes_on and seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED:
+        return "what is seen at the best pose goes on beyond it"
+    least = config.believe if goes_on else config.sure if found.grounds.turn_rad is None else config.regain
+    return "" if found.confidence >= least else f"the best pose is right at {found.confidence:.0%}"
 
 
 class Looking:
@@ -128,8 +131,8 @@ class Looking:
         """The score of what was believed, None where the object is lost: next time every place is looked at then."""
         self._usual = 1.0 if score is None else score
 
-    def concepts_agree(self) -> None:
-        """Somebody else has asked them."""
+    def concepts_asked(self) -> None:
+        """Somebody else has done so."""
         self._without_concepts = 0
 
     def outline(self, T_cam_obj: Pose, frame: Frame, clock: Stopwatch) -> Mask | str:

@@ -127,7 +127,8 @@ class Places:
     def _near(self, moving: Pose | None, now: Moment, look: Looking) -> Iterator[Look | str]:
         """Near each pose that is expected, of which there is one at least; where it is clearly at none, anywhere around
         the first. moving: where it is if it moves on as it did, unless it was suspected elsewhere."""
-        contested = moving is not None and self._where.suspect(now.camera) is not None
+        suspect = self._where.suspect(now.camera)
+        contested = moving is not None and suspect is not None and not self.same(moving, suspect)
         near: list[Pose] = []
         for pose in chain(() if moving is None else (moving,), self._where.expected(now.camera)):
             if not any(self.same(pose, other) for other in near):

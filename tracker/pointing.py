@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,18 @@ def parse_pointer(text: str) -> Pointer:
     if len(numbers) == 4 and numbers[0] < numbers[2] and numbers[1] < numbers[3]:
         return Box(*numbers)
     raise ConfigError(f"{text!r} points nowhere; expected a pixel X,Y or a box X0,Y0,X1,Y1, whole numbers")
+
+
+def parse_pointers(texts: Iterable[str], object_ids: Sequence[str]) -> dict[str, Pointer]:
+    """ "NAME=POINTER", or "POINTER" alone where there is one object -> by object. Raises ConfigError where it is not
+    clear which object is meant, or where it is."""
+    pointers = {}
+    for text in texts:
+        name, separator, there = text.rpartition("=")
+        if not separator and len(object_ids) > 1:
+            raise ConfigError(f"{text}: of which object? Write NAME={text}, NAME one of {', '.join(object_ids)}")
+        pointers[name if separator else object_ids[0]] = parse_pointer(there)
+    return pointers
 
 
 def measured_in(box: Box, frame: Frame) -> Mask:

@@ -78,7 +78,7 @@ class Reviews:
         """Tell every object what was found of it, if the worker is done. Raises what the backend raised."""
         if self._found is None or not self._found.done():
             return
-        found, self._found = self._found.result(), None
-        for (track, review), one in zip(self._reviews, found, strict=True):
+        done, self._found = self._found, None
+        for (track, review), one in zip(self._reviews, done.result(), strict=True):
             if one is not None:
                 track.reviewed(review, one, camera)

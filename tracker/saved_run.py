@@ -14,7 +14,7 @@ from tracker.first_masks import FirstMasks
 from tracker.frame import Frame
 from tracker.in_order import InOrder
 from tracker.pipeline import ObjectTracker
-from tracker.pointing import Pointer, parse_pointer
+from tracker.pointing import parse_pointers
 from tracker.result import TrackResult
 from tracker.saliency import BackendOptions, SaliencyBackend, open_backend
 from tracker.sources import FrameSource, LiveSource, open_source
@@ -71,7 +71,7 @@ class Replay:
                 f"{run.source} was a camera, whose frames come once: track what --record FILE wrote of it instead"
             )
         self.tracker = ObjectTracker(self.models, self.config, self.backend)
-        self._pointed_out = dict(self._pointers(run))
+        self._pointed_out = parse_pointers(run.at, [model.object_id for model in self.models])
 
     def __iter__(self) -> Iterator[tuple[Frame, tuple[TrackResult, ...]]]:
         first_masks = FirstMasks(self._pointed_out)
@@ -79,8 +79,3 @@ class Replay:
             self.tracker.point_out(object_id, there)
         for frame in InOrder(iter(self.source)):
             yield frame, self.tracker.step(frame if self.config.masks == "given" else first_masks(frame))
-
-    def _pointers(self, run: SavedRun) -> Iterator[tuple[str, Pointer]]:
-        for text in run.at:
-            name, _, there = text.rpartition("=")
-            yield name or self.models[0].object_id, parse_pointer(there)

@@ -43,8 +43,8 @@ class Sight:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction or search. view: the
-    pixels by which it was judged."""
+    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction, search, or turn, of
+    another pose about its axis. view: the pixels by which it was judged."""
 
     refined: Refined
     evidence: Evidence
@@ -117,12 +117,11 @@ class Search:
         with clock("verification"):
             worth = {pose: self._roughly(pose, sight) for pose in self._turns.of(hypothesis.refined.T_cam_obj)}
         likely = [pose for pose in worth if worth[pose] > HALF_AS_GOOD * hypothesis.evidence.score]
-        likely = sorted(likely, key=lambda pose: -worth[pose])
         chosen: list[Pose] = []
-        for pose in likely:
+        for pose in sorted(likely, key=lambda pose: -worth[pose]):
             if len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
                 chosen.append(pose)
-        found = [self._refined(pose, sight, "search", clock) for pose in chosen]
+        found = [self._refined(pose, sight, "turn", clock) for pose in chosen]
         return [hypothesis for hypothesis in found if hypothesis]
 
     def _inequivalent(self, candidates: Sequence[Candidate]) -> list[Candidate]:

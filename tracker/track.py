@@ -13,7 +13,7 @@ from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import Mask
 from tracker.geometry import Pose
-from tracker.looking import Asking, Attempt, Found, Look, Looking, believed, why_not
+from tracker.looking import Asking, Attempt, Found, Look, Looking, believed, doubt
 from tracker.places import Moment, Places
 from tracker.pointing import Pointer
 from tracker.pose_filter import PoseFilter
@@ -94,7 +94,8 @@ class Track:
             return self._tracked(now, found, predicted)
         if self._carried:
             self._places.not_found(now, suspected)
-        return self._lost(now, "seen again: the next frame has to confirm it" if suspected else why_not(found))
+        again = "seen again: the next frame has to confirm it"
+        return self._lost(now, again if suspected else doubt(found, self._followed, self._config))
 
     def review(self, now: Moment) -> Review | None:
         """Of the frame of the last step, where it went without concepts that it asked for."""
@@ -114,7 +115,7 @@ class Track:
             self._places.suspected(T_then_obj, review.landmarks, camera)
         elif review.believed is not None:
             T_then_obj = self._model.symmetry.nearest(T_then_obj, review.believed)
-            self._look.concepts_agree()
+            self._look.concepts_asked()
             if not self._places.same(T_then_obj, review.believed):
                 self._places.suspected(self._raw @ review.believed.inverse() @ T_then_obj, camera.now, camera)
 
