@@ -58,6 +58,16 @@ class Ask:
         return cached_vocabulary(self.category, self.kind, self.concepts, endpoint, picture).labels
 
 
+@dataclass(frozen=True, slots=True)
+class _Means:
+    """What a model is made by, whichever way. labels, symmetry: None where they are still to be found."""
+
+    backend: SaliencyBackend
+    config: TrackerConfig
+    labels: tuple[str, ...] | None
+    symmetry: Symmetry | None
+
+
 @dataclass
 class Reference:
     """Make a concept model from a few frames of a recording in which the object's pose is known, or --unposed, or from
@@ -136,9 +146,8 @@ class Reference:
         config, symmetry = read_config(self.config), self._symmetry()
         labels = read_vocabulary(self.vocabulary).for_object(self.object).labels if self.vocabulary else None
         backend = open_backend(self.backend, BackendOptions(self.weights, self.device))
-        source = open_source(self.source)
         make = self._turned if self._is_turned else self._unposed if self.unposed else self._posed
-        model = make(source, backend, config, labels, symmetry)
+        model = make(open_source(self.source), _Means(backend, config, labels, symmetry))
         model.save(self.out)
         if "concepts" in plates:
             write_concept_plate(plates["concepts"], model, backend)
@@ -148,43 +157,21 @@ class Reference:
         if self.json:
             say_json(_facts(model, self.out))
 
-    def _posed(
-        self,
-        source: FrameSource,
-        backend: SaliencyBackend,
-        config: TrackerConfig,
-        labels: tuple[str, ...] | None,
-        symmetry: Symmetry | None,
-    ) -> ConceptModel:
+    def _posed(self, source: FrameSource, by: _Means) -> ConceptModel:
         from reference.onboard import onboard, read_reference_frames
 
         frames = read_reference_frames(source, self.object, self.views or VIEWS)
-        labels = labels or self.ask.labels(frames[0].frame, frames[0].mask)
-        return onboard(frames, backend, config.view, config.cloud, labels, symmetry)
+        labels = by.labels or self.ask.labels(frames[0].frame, frames[0].mask)
+        return onboard(frames, by.backend, by.config.view, by.config.cloud, labels, by.symmetry)
 
-    def _unposed(
-        self,
-        source: FrameSource,
-        backend: SaliencyBackend,
-        config: TrackerConfig,
-        labels: tuple[str, ...] | None,
-        symmetry: Symmetry | None,
-    ) -> ConceptModel:
+    def _unposed(self, source: FrameSource, by: _Means) -> ConceptModel:
         from reference.unposed import onboard_unposed, read_unposed_frames
 
         frames = read_unposed_frames(source, self.object, self.views or VIEWS)
-        labels = labels or self.ask.labels(*frames[0])
-        sure = self.least_confidence
-        return onboard_unposed(frames, self.object, backend, config, labels, symmetry, least_confidence=sure)
+        labels, sure = by.labels or self.ask.labels(*frames[0]), self.least_confidence
+        return onboard_unposed(frames, self.object, by.backend, by.config, labels, by.symmetry, least_confidence=sure)
 
-    def _turned(
-        self,
-        source: FrameSource,
-        backend: SaliencyBackend,
-        config: TrackerConfig,
-        labels: tuple[str, ...] | None,
-        symmetry: Symmetry | None,
-    ) -> ConceptModel:
+    def _turned(self, source: FrameSource, by: _Means) -> ConceptModel:
         from contextlib import ExitStack
 
         from reference.completion import MOST_VIEWS
@@ -202,8 +189,8 @@ class Reference:
             coming = stack.enter_context(Latest(source)) if isinstance(source, LiveSource) else source
             frames = iter(InOrder(coming, live=live))
             frame, mask = first_sight(frames, there)
-            labels = labels or self.ask.labels(frame, mask)
-            turned = TurnedObject(frame, mask, self.object, backend, config, labels, symmetry, views, self.coverage)
+            labels, enough = by.labels or self.ask.labels(frame, mask), (views, self.coverage)
+            turned = TurnedObject(frame, mask, self.object, by.backend, by.config, labels, by.symmetry, *enough)
             show = stack.enter_context(_sphere_bar(self.object, self.coverage))
             try:
                 show(turned.progress)

@@ -20,7 +20,7 @@ from reference.planes import Plane, planes_behind
 from tracker.errors import OnboardingError
 from tracker.frame import Frame, Mask
 from tracker.geometry import Floats
-from tracker.pointing import REACH_PX, Click, Pointer, clicked_m, measured_in
+from tracker.pointing import Click, Pointer, around, clicked_m, inside, measured_in
 from tracker.view import Box, bounding_box
 
 JUMP_M, JUMP_SHARE = 0.01, 0.01  # between neighbouring pixels, of the depth: where it is more, one thing ends
@@ -62,7 +62,7 @@ def segment(frame: Frame, there: Pointer | None = None, seed: int = 42) -> Mask:
         mask = labels == _nearest(labels, frame, planes, where)
     mask = _with_rim(mask, frame.depth_m)
     if isinstance(there, Box):
-        mask &= _inside(there, mask.shape)
+        mask &= inside(there, mask.shape)
     if mask.mean() > MOST_OF_PICTURE:
         raise OnboardingError(
             f"{where}: what is there fills {mask.mean():.0%} of the picture and hangs together with all around it; "
@@ -118,8 +118,7 @@ def _connected(kept: Mask, depth_m: npt.NDArray[np.float32]) -> Labels:
 
 def _clicked(labels: Labels, click: Click, where: str) -> int:
     """The component that a click hits: what most of the pixels around it are."""
-    inside = _inside(Box(click.column - REACH_PX, click.row - REACH_PX, click.column + 5, click.row + 5), labels.shape)
-    found, counts = np.unique(labels[inside & (labels > 0)], return_counts=True)
+    found, counts = np.unique(labels[inside(around(click), labels.shape) & (labels > 0)], return_counts=True)
     if not len(found):
         raise OnboardingError(
             f"{where}: pixel {click.column},{click.row} shows what things stand on, or nothing; expected a pixel "
@@ -131,8 +130,8 @@ def _clicked(labels: Labels, click: Click, where: str) -> int:
 def _boxed(labels: Labels, box: Box, frame: Frame, where: str) -> Mask:
     """The component with most pixels in a box, of those that are mostly in it, and those beside it at its depth: what
     is thin falls into pieces."""
-    inside = _inside(box, labels.shape)
-    within, whole = (np.bincount(part, minlength=int(labels.max()) + 1) for part in (labels[inside], labels.ravel()))
+    in_box = inside(box, labels.shape)
+    within, whole = (np.bincount(part, minlength=int(labels.max()) + 1) for part in (labels[in_box], labels.ravel()))
     mostly = within >= MOSTLY * np.maximum(whole, 1)
     mostly[0] = False
     if not mostly.any() or not within[mostly].any():
@@ -144,7 +143,7 @@ def _boxed(labels: Labels, box: Box, frame: Frame, where: str) -> Mask:
     main = labels == int(np.argmax(np.where(mostly, within, 0)))
     near = np.abs(frame.depth_m - np.median(frame.depth_m[main])) < _size_m(main, frame)
     wholly = (within > 0) & (within >= WHOLLY * whole)
-    return main & inside | (mostly & wholly)[labels] & near & inside
+    return main & in_box | (mostly & wholly)[labels] & near & in_box
 
 
 def _size_m(mask: Mask, frame: Frame) -> float:
@@ -188,9 +187,3 @@ def _with_rim(mask: Mask, depth_m: npt.NDArray[np.float32]) -> Mask:
     of_mask = np.zeros(int(nearest.max()) + 1, bool)
     of_mask[nearest[mask & measured]] = True
     return mask | (of_mask[nearest] & (away_px <= RIM_PX))
-
-
-def _inside(box: Box, shape: tuple[int, ...]) -> Mask:
-    inside = np.zeros(shape, bool)
-    inside[max(box.y0, 0) : max(box.y1, 0), max(box.x0, 0) : max(box.x1, 0)] = True
-    return inside

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -39,6 +40,22 @@ def shared_data() -> Path:
     return SHARED_DATA
 
 
+@pytest.fixture
+def program(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
+    """A program's `main` in this process with these arguments: its exit code and what it says, on one line."""
+
+    def call(main: Callable[[], None], *arguments: object) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["program", *map(str, arguments)])
+        try:
+            main()
+            code = 0
+        except SystemExit as ending:
+            code = int(ending.code or 0)
+        return code, " ".join(str(capsys.readouterr().err).split())
+
+    return call
+
+
 @pytest.fixture(scope="session")
 def attributes() -> SaliencyBackend:
     """The backend that needs no weights."""
@@ -57,6 +74,14 @@ def can_model(can_scene: SyntheticScene, attributes: SaliencyBackend) -> Concept
     sightings = can_scene.sightings("soup_can")
     frames = [(can_scene[k], sightings[k].T_cam_obj) for k in (53, 5, 86)]
     return onboard([PosedFrame(frame, "soup_can", pose, frame.masks["soup_can"]) for frame, pose in frames], attributes)
+
+
+@pytest.fixture(scope="session")
+def can_file(can_model: ConceptModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`can_model`, saved."""
+    path = tmp_path_factory.mktemp("models") / "can.concept"
+    can_model.save(path)
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,19 +55,9 @@ def other(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture
-def ablate(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str]]:
+def ablate(program: Callable[..., tuple[int, str]]) -> Callable[..., tuple[int, str]]:
     """`python -m eval ablate` in this process: its exit code and what it says."""
-
-    def call(*options: object) -> tuple[int, str]:
-        monkeypatch.setattr(sys, "argv", ["eval", "ablate", *map(str, options)])
-        try:
-            eval.__main__.main()
-            code = 0
-        except SystemExit as ending:
-            code = int(ending.code or 0)
-        return code, " ".join(str(capsys.readouterr().err).split())
-
-    return call
+    return lambda *options: program(eval.__main__.main, "ablate", *options)
 
 
 @pytest.fixture

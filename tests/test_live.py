@@ -6,7 +6,6 @@ import json
 import logging
 import os
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -36,28 +35,10 @@ from tracker.sources.synthetic.faults import without_depth
 Run = Callable[..., tuple[int, str]]
 
 
-@pytest.fixture(scope="module")
-def model_file(can_model: ConceptModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("models") / "can.concept"
-    can_model.save(path)
-    return path
-
-
 @pytest.fixture
-def run(model_file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(can_file: Path, program: Callable[..., tuple[int, str]]) -> Run:
     """`python -m tracker` in this process: its exit code and what it says."""
-
-    def call(source: str, *options: object) -> tuple[int, str]:
-        arguments = ["tracker", source, "--model", str(model_file), *map(str, options)]
-        monkeypatch.setattr(sys, "argv", arguments)
-        try:
-            tracker.__main__.main()
-            code = 0
-        except SystemExit as ending:
-            code = int(ending.code or 0)
-        return code, " ".join(str(capsys.readouterr().err).split())
-
-    return call
+    return lambda source, *options: program(tracker.__main__.main, source, "--model", can_file, *options)
 
 
 @pytest.fixture

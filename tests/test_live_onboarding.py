@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -111,20 +110,10 @@ def test_a_camera_may_begin_with_frames_that_show_nothing(scene: SyntheticScene)
 
 
 @pytest.fixture
-def run(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(tmp_path: Path, program: Callable[..., tuple[int, str]]) -> Run:
     """`python -m reference` in this process: its exit code and what it says."""
-
-    def call(source: str, *options: object) -> tuple[int, str]:
-        out = ("--object", "box", "--out", str(tmp_path / "box.concept"))
-        monkeypatch.setattr(sys, "argv", ["reference", source, *out, *map(str, options)])
-        try:
-            reference.__main__.main()
-            code = 0
-        except SystemExit as ending:
-            code = int(ending.code or 0)
-        return code, " ".join(str(capsys.readouterr().err).split())
-
-    return call
+    out = ("--object", "box", "--out", tmp_path / "box.concept")
+    return lambda source, *options: program(reference.__main__.main, source, *out, *options)
 
 
 @pytest.fixture

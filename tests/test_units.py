@@ -212,21 +212,9 @@ def test_a_cluster_whose_package_is_missing_names_the_extra(
 
 
 @pytest.fixture
-def track(
-    dataset: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., tuple[int, str]]:
+def track(dataset: str, program: Callable[..., tuple[int, str]]) -> Callable[..., tuple[int, str]]:
     """`python -m eval track` in this process: its exit code and what it says."""
-
-    def call(*options: object) -> tuple[int, str]:
-        monkeypatch.setattr(sys, "argv", ["eval", "track", "--dataset", dataset, *map(str, options)])
-        try:
-            eval.__main__.main()
-            code = 0
-        except SystemExit as ending:
-            code = int(ending.code or 0)
-        return code, " ".join(str(capsys.readouterr().err).split())
-
-    return call
+    return lambda *options: program(eval.__main__.main, "track", "--dataset", dataset, *options)
 
 
 def poses(folder: Path) -> list[tuple]:

@@ -16,7 +16,6 @@ import pytest
 
 import tracker.__main__
 from tests.web_page import LONG_S, Caller
-from tracker.concept import ConceptModel
 from tracker.web import TOKEN_VARIABLE
 
 aiohttp = pytest.importorskip("aiohttp")
@@ -26,26 +25,12 @@ TOKEN = "a-token-that-nobody-guesses"  # noqa: S105
 Run = Callable[..., tuple[int, str]]
 
 
-@pytest.fixture(scope="module")
-def model_file(can_model: ConceptModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("models") / "can.concept"
-    can_model.save(path)
-    return path
-
-
 @pytest.fixture
-def run(model_file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(can_file: Path, program: Callable[..., tuple[int, str]]) -> Run:
     """`python -m tracker` in this process: its exit code and what it says."""
 
     def call(*options: object, frames: int = 4) -> tuple[int, str]:
-        source = f"{SCENE}&frames={frames}"
-        monkeypatch.setattr(sys, "argv", ["tracker", source, "--model", str(model_file), *map(str, options)])
-        try:
-            tracker.__main__.main()
-            code = 0
-        except SystemExit as ending:
-            code = int(ending.code or 0)
-        return code, str(capsys.readouterr().err)
+        return program(tracker.__main__.main, f"{SCENE}&frames={frames}", "--model", can_file, *options)
 
     return call
 
@@ -94,7 +79,7 @@ def test_the_page_stays_when_the_frames_end_and_ctrl_c_ends_it_with_everything_w
     code, said = run("--serve", port, "--out", tmp_path / "out", "--view", "overlay")
     browser.join()
     assert code == 0, said
-    assert f"the page: http://127.0.0.1:{port}/\n" in said
+    assert f"the page: http://127.0.0.1:{port}/ " in said
     assert "the page stays until ctrl-C" in said
     assert "stopped; what was tracked is kept" in said
     lines = [json.loads(line) for line in (tmp_path / "out" / "poses.jsonl").read_text().splitlines()]

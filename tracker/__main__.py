@@ -16,11 +16,13 @@ from rich.table import Table
 from tracker.terminal import ALWAYS, STDERR, hush, progress, run
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from tracker.concept import ConceptModel
     from tracker.config import TrackerConfig
+    from tracker.output import PoseOutput
     from tracker.pipeline import ObjectTracker
+    from tracker.region import Region
     from tracker.remote_control import RemoteControl
     from tracker.result import TrackResult
     from tracker.sources import FrameSource
@@ -93,15 +95,13 @@ class Track:
         from tracker.first_masks import FirstMasks
         from tracker.in_order import InOrder
         from tracker.latest import Latest
-        from tracker.output import PoseLines, PoseOutput, result_folder
+        from tracker.output import result_folder
         from tracker.pipeline import ObjectTracker
         from tracker.pointing import parse_pointers
-        from tracker.pose_files import open_pose_files
         from tracker.remote_control import RemoteControl
-        from tracker.ros_results import PosePublisher
         from tracker.saliency import BackendOptions, open_backend
         from tracker.saved_run import SavedRun
-        from tracker.sources import LiveSource, RosSource, length_of
+        from tracker.sources import LiveSource, length_of
         from tracker.viewer import Several
 
         hush(self.quiet or self.json)
@@ -135,15 +135,7 @@ class Track:
             coming = stack.enter_context(live) if live else source
             shown = progress(coming, length_of(source), "tracking", summary.now)
             frames = InOrder(shown, live=live is not None)
-            texts = [sys.stdout] if self.json else []
-            if folder:
-                texts.append(stack.enter_context((folder / "poses.jsonl").open("w")))
-            files = open_pose_files(self.write, folder, list(regions)) if folder else []
-            located = [object_id for object_id, concepts in regions.items() if concepts]
-            outputs = [PoseOutput([PoseLines(texts, regions), *files], self.smooth, located)]
-            if isinstance(source, RosSource):
-                publisher = PosePublisher(source.ros, source.node, models, lambda: source.frame_id)
-                outputs.append(PoseOutput([publisher]))
+            outputs = self._outputs(stack, folder, source, models, regions)
             try:
                 for frame in frames:
                     results = tracker.step(frame if config.masks == "given" else first_masks(frame))
@@ -164,16 +156,35 @@ class Track:
                 failure = error
             for output in outputs:
                 output.finish()
-        if frames.refused:
-            ALWAYS.print(f"{frames.refused} frames left out: they came late, or with the stamp of another")
-        for what, count in live.left_out.items() if live else ():
-            if count:
-                ALWAYS.print(f"{count} frames {what}")
-        if tracker.frames_without_concepts:
-            ALWAYS.print(f"{tracker.frames_without_concepts} frames went without concepts that were asked for")
+        _tell(frames.refused, live.left_out if live else {}, tracker.frames_without_concepts)
         if failure:
             raise failure
         STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
+
+    def _outputs(
+        self,
+        stack: ExitStack,
+        folder: Path | None,
+        source: FrameSource,
+        models: Sequence[ConceptModel],
+        regions: Mapping[str, Mapping[str, Region | None]],
+    ) -> list[PoseOutput]:
+        """Where results go, as files of the stack where they are ones. Raises OutputError."""
+        from tracker.output import PoseLines, PoseOutput
+        from tracker.pose_files import open_pose_files
+        from tracker.ros_results import PosePublisher
+        from tracker.sources import RosSource
+
+        texts = [sys.stdout] if self.json else []
+        if folder:
+            texts.append(stack.enter_context((folder / "poses.jsonl").open("w")))
+        files = open_pose_files(self.write, folder, list(regions)) if folder else []
+        located = [object_id for object_id, concepts in regions.items() if concepts]
+        outputs = [PoseOutput([PoseLines(texts, regions), *files], self.smooth, located)]
+        if isinstance(source, RosSource):
+            publisher = PosePublisher(source.ros, source.node, models, lambda: source.frame_id)
+            outputs.append(PoseOutput([publisher]))  # what is live is never smoothed
+        return outputs
 
     def _viewer(self, folder: Path | None, models: Sequence[ConceptModel]) -> Viewer:
         """Raises as `RerunLog` does, and OutputError where its file is there already."""
@@ -237,6 +248,18 @@ class Track:
         if self.smooth != "off" and not config.prior:
             raise ConfigError(f"--smooth {self.smooth} smooths what is followed through time: it needs --prior on")
         return config
+
+
+def _tell(refused: int, left_out: Mapping[str, int], without_concepts: int) -> None:
+    """Which frames were not tracked, or not as they should be, and how many, if any."""
+    counts = {
+        "left out: they came late, or with the stamp of another": refused,
+        **left_out,
+        "went without concepts that were asked for": without_concepts,
+    }
+    for what, count in counts.items():
+        if count:
+            ALWAYS.print(f"{count} frames {what}")
 
 
 @dataclass

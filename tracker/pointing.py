@@ -50,19 +50,28 @@ def parse_pointers(texts: Iterable[str], object_ids: Sequence[str]) -> dict[str,
     return pointers
 
 
+def around(click: Click) -> Box:
+    """The pixels that a click stands for."""
+    column, row = click
+    return Box(column - REACH_PX, row - REACH_PX, column + REACH_PX + 1, row + REACH_PX + 1)
+
+
+def inside(box: Box, shape: tuple[int, ...]) -> Mask:
+    """(H, W) bool, the pixels of a picture of this shape that are in the box."""
+    mask = np.zeros(shape, bool)
+    mask[max(box.y0, 0) : max(box.y1, 0), max(box.x0, 0) : max(box.x1, 0)] = True
+    return mask
+
+
 def measured_in(box: Box, frame: Frame) -> Mask:
     """(H, W) bool, the pixels of the box that have depth. What lies behind the object is among them."""
-    mask = np.zeros(frame.depth_m.shape, bool)
-    inside = np.s_[max(box.y0, 0) : max(box.y1, 0), max(box.x0, 0) : max(box.x1, 0)]
-    mask[inside] = frame.depth_m[inside] > 0
-    return mask
+    return inside(box, frame.depth_m.shape) & (frame.depth_m > 0)
 
 
 def clicked_m(click: Click, frame: Frame) -> Floats | None:
     """(3,) the point of the surface that was clicked, metres, camera coordinates; None where there is no depth."""
-    column, row = click
-    around = Box(column - REACH_PX, row - REACH_PX, column + REACH_PX + 1, row + REACH_PX + 1)
-    depths_m = frame.depth_m[measured_in(around, frame)]
+    depths_m = frame.depth_m[measured_in(around(click), frame)]
     if not len(depths_m):
         return None
-    return frame.intrinsics.unproject(np.array([column]), np.array([row]), np.array([np.median(depths_m)], float))[0]
+    at = (np.array([click.column]), np.array([click.row]), np.array([np.median(depths_m)], float))
+    return frame.intrinsics.unproject(*at)[0]

@@ -6,12 +6,22 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from tracker.errors import SourceError
+from tracker.sources.query import number, some, yes_or_no
 from tracker.sources.ros_frames import WHAT_TO_RECORD, is_rectified
 from tracker.sources.ros_images import Kind
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 INFO_TYPE = "sensor_msgs/msg/CameraInfo"
 TRANSPORTS = ("compressed", "compressedDepth")
+SLOP_S = 0.02  # less than the time between two pictures at 30 Hz, more than what drivers stamp apart
+OPTIONS = {  # of a bag and of a running ROS
+    "colour": some,
+    "depth": some,
+    "info": some,
+    "depth_unit": number(1e-6, 1.0, "metres per unit of the depth"),
+    "slop": number(0, 10, "seconds"),
+    "registered": yes_or_no,
+}
 
 
 @dataclass(frozen=True, slots=True)

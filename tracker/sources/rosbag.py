@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 from tracker.errors import MissingExtraError, SourceError
 from tracker.frame import Frame
 from tracker.sources.approximate_time import Pairing
-from tracker.sources.query import number, read_query, some, yes_or_no
+from tracker.sources.query import read_query
 from tracker.sources.ros_frames import RosFrames
 from tracker.sources.ros_images import kind_of, stamp_ns
-from tracker.sources.ros_topics import IMAGE_TYPES, INFO_TYPE, Topic, choose_topics
+from tracker.sources.ros_topics import IMAGE_TYPES, INFO_TYPE, OPTIONS, SLOP_S, Topic, choose_topics
 
 if TYPE_CHECKING:
     from rosbags.rosbag1 import Reader as Reader1
@@ -28,16 +28,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-SLOP_S = 0.02  # less than the time between two pictures at 30 Hz, more than what drivers stamp apart
 REORDER = 5  # messages of a topic that may be recorded in another order than they were stamped in
-OPTIONS = {
-    "colour": some,
-    "depth": some,
-    "info": some,
-    "depth_unit": number(1e-6, 1.0, "metres per unit of the depth"),
-    "slop": number(0, 10, "seconds"),
-    "registered": yes_or_no,
-}
 
 
 class RosBag:

@@ -13,21 +13,13 @@ from types import SimpleNamespace
 from typing import Any
 
 from tracker.errors import MissingExtraError
-from tracker.sources.query import number, read_query, some, yes_or_no
+from tracker.sources.query import read_query
 from tracker.sources.ros2.camera import Ros2Camera, Topics
+from tracker.sources.ros_topics import OPTIONS, SLOP_S
 
 __all__ = ["Ros2Camera", "Topics", "open_ros2"]
 
 COLOUR, DEPTH = "/camera/color/image_raw", "/camera/aligned_depth_to_color/image_raw"
-SLOP_S = 0.02
-OPTIONS = {
-    "colour": some,
-    "depth": some,
-    "info": some,
-    "depth_unit": number(1e-6, 1.0, "metres per unit of the depth"),
-    "slop": number(0, 10, "seconds"),
-    "registered": yes_or_no,
-}
 
 
 def open_ros2(argument: str) -> Ros2Camera:
