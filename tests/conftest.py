@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -27,6 +28,9 @@ SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 # The same examples at every run, and no example fails because the machine was busy.
 settings.register_profile("conceptrack", deadline=None, derandomize=True)
 settings.load_profile("conceptrack")
+
+# A shell that starts tests in the background has ctrl-C ignored, and tests that press it would wait for ever.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Small tensors gain nothing from more threads, and on a busy machine threads wait for each other.
 torch.set_num_threads(1)
