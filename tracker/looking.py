@@ -20,8 +20,8 @@ from tracker.view import ObjectView, view_object
 
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
 MOST_TRIED = 64  # poses that are remembered
-# What is seen again has to end where its outline does or to show much of itself, and most of what faces the camera has
-# to be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
+# What is seen where nothing was expected has to end where its outline does or to show much of itself, and most of what
+# faces the camera has to be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
 LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
 STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
 
@@ -86,16 +86,17 @@ def doubt(found: Found | str, followed: bool, config: TrackerConfig) -> str:
 
 def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
     """What a pose lacks. It has to be likely. Where nobody says which pixels are the object's, less is asked where it
-    was expected while it is followed than of what is seen again or has jumped, so that a state does not flicker; and
-    most where nothing was expected."""
+    was expected while it is followed than of what is seen again near there or has jumped, so that a state does not
+    flicker; and most where nothing was expected."""
     seen, goes_on = found.hypothesis.evidence, found.masked or (followed and found.hypothesis.origin != "search")
+    out_of_nowhere = not goes_on and found.grounds.turn_rad is None
     if seen.surface < LEAST_SURFACE:
         return f"{seen.surface:.0%} of what should be seen is in place"
-    if not goes_on and seen.hidden > MOST_HIDDEN:
+    if out_of_nowhere and seen.hidden > MOST_HIDDEN:
         return f"at the best pose {seen.hidden:.0%} of it would be hidden"
-    if not goes_on and seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED:
+    if out_of_nowhere and seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED:
         return "what is seen at the best pose goes on beyond it"
-    least = config.believe if goes_on else config.sure if found.grounds.turn_rad is None else config.regain
+    least = config.believe if goes_on else config.sure if out_of_nowhere else config.regain
     return "" if found.confidence >= least else f"the best pose is right at {found.confidence:.0%}"
 
 
