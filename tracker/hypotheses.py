@@ -8,13 +8,12 @@ two right correspondences keep their distance, and so do both with many others (
 from __future__ import annotations
 
 from functools import cached_property
-from math import ceil
+from math import ceil, sqrt
 
 import torch
 
 from tracker.umeyama import Motions, triangles, umeyama, umeyama_of_moments
 
-AT_A_TIME = 20_000  # samples whose first edges are tested together: what fits the cache
 LEAST_HEIGHT = 0.1  # of a triangle over its edge; flatter ones hardly fix the turn about it
 SAME_SIDE = 0.5  # least cosine between the normals of two points that are the same
 
@@ -53,15 +52,14 @@ class Pairs:
 
 def squared_distances(pairs: Pairs, motions: Motions) -> torch.Tensor:
     """(B, M) |p - R m - t|^2, multiplied out, so that it is one matrix product."""
-    t, R = motions.translation, motions.rotation
-    back = (R.transpose(1, 2) @ t.unsqueeze(2)).squeeze(2)
-    one, far = torch.ones_like(t[:, :1]), (t * t).sum(dim=1, keepdim=True)
-    return torch.cat((one, far, -2 * t, 2 * back, -2 * R.flatten(1)), dim=1) @ pairs.terms.T
+    return _factors(motions) @ pairs.terms.T
 
 
 def closeness(pairs: Pairs, motions: Motions, threshold_m: float) -> torch.Tensor:
-    """(B, M) from 1 where a pair meets under a motion to 0 from the threshold on."""
-    return squared_distances(pairs, motions).mul_(-1 / threshold_m**2).add_(1).clamp_(min=0)
+    """(B, M) from 1 where a pair meets under a motion to 0 from the threshold on, 1 - d^2 / threshold^2."""
+    factors = _factors(motions).mul_(-1 / threshold_m**2)
+    factors[:, 1] += 1  # of the term that is 1: scaled and taken from 1 in the product, not in passes over its result
+    return (factors @ pairs.terms.T).clamp_(min=0)
 
 
 def support(pairs: Pairs, motions: Motions, threshold_m: float) -> torch.Tensor:
@@ -89,27 +87,30 @@ def sampled(
     most: int,
     generator: torch.Generator,
 ) -> Motions:
-    """Motions of up to `most` of random triples, those that are congruent to within slack_m. Triples are drawn in
-    rounds that use every pair once, as many rounds as make at least `count`.
+    """Motions of up to `most` of random triples, those that are congruent to within slack_m; of `count` triples at
+    least are the edges compared, fewer only where there are not so many.
 
-    The pairs are shuffled once, and a round takes every pair with those at two random distances from it: whole rows
-    are compared with whole rows, where looking up single pairs would cost more than all arithmetic.
+    The pairs are shuffled once; a triple is a pair and those two of a few random steps further on. So an edge serves
+    every triple of its pair that takes its step, and whole rows are compared with whole rows: looking up the corners
+    of each triple would cost more than all arithmetic.
     """
+    rounds = ceil(count / len(pairs))
+    few = min(ceil((1 + sqrt(1 + 8 * rounds)) / 2), len(pairs) - 1)  # steps of which there are so many twos
     order = torch.randperm(len(pairs), generator=generator, device=generator.device)
-    steps = torch.randint(1, len(pairs), (2, ceil(count / len(pairs))), generator=generator, device=generator.device)
+    steps = 1 + torch.randperm(len(pairs) - 1, generator=generator, device=generator.device)[:few]
     pairs = pairs[torch.cat((order, order))]  # twice, so that a step may go beyond the end
-    rounds, first = _congruent_with_one_at(steps[0], pairs, slack_m, shortest_m).unbind(dim=1)
-    triples = torch.stack((first, first + steps[0][rounds], first + steps[1][rounds]))
+    two = torch.combinations(torch.arange(few, device=steps.device))[:rounds]
+    fits = _congruent_after(steps, pairs, slack_m, shortest_m)
+    which, first = (fits[two[:, 0]] & fits[two[:, 1]]).nonzero().unbind(dim=1)
+    triples = torch.stack((first, first + steps[two[which, 0]], first + steps[two[which, 1]]))
     together = _padded(pairs.points, pairs.model_points)
-    tilts = None if pairs.normal_terms is None else _padded(pairs.normals, pairs.model_normals)
-    for i, j in ((0, 1), (1, 2), (2, 0)):  # edge by edge: each test sees only what passes those before
-        if (i, j) != (0, 1):
-            edges = _differences(together, triples[i], triples[j])
-            fits = _congruent(edges[:, 0], edges[:, 1], slack_m, shortest_m)
-            triples = triples[:, fits.nonzero()[:, 0]]
-        if tilts is not None:
+    third = together[triples[1]].sub_(together[triples[2]]).square_().reshape(-1, 2, 4).sum(dim=2).sqrt_()
+    triples = triples[:, _congruent(third[:, 0], third[:, 1], slack_m, shortest_m)]
+    if pairs.normal_terms is not None:
+        tilts = _padded(pairs.normals, pairs.model_normals)
+        for i, j in ((0, 1), (0, 2), (1, 2)):  # each test sees only what passes those before
             bends = (tilts[triples[i]] * tilts[triples[j]]).reshape(-1, 2, 4).sum(dim=2)
-            triples = triples[:, ((bends[:, 0] - bends[:, 1]).abs() < normal_cosine).nonzero()[:, 0]]
+            triples = triples[:, (bends[:, 0] - bends[:, 1]).abs() < normal_cosine]
     triples = triples[:, :most].T
     source, target = pairs.model_points[triples], pairs.points[triples]
     spread = _spread(source)
@@ -142,6 +143,14 @@ def seeded(
     return motions[motions.determined & (best.values[:, min(2, best.values.shape[1] - 1)] > 0)]
 
 
+def _factors(motions: Motions) -> torch.Tensor:
+    """(B, 17) what `Pairs.terms` are multiplied with in a squared distance."""
+    t, R = motions.translation, motions.rotation
+    back = (R.transpose(1, 2) @ t.unsqueeze(2)).squeeze(2)
+    one, far = torch.ones_like(t[:, :1]), (t * t).sum(dim=1, keepdim=True)
+    return torch.cat((one, far, -2 * t, 2 * back, -2 * R.flatten(1)), dim=1)
+
+
 def _outer(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     """(M, 9) products of the coordinates of (M, 3) and (M, 3), in the order of a flattened rotation."""
     return (a.unsqueeze(2) * b.unsqueeze(1)).flatten(1)
@@ -152,29 +161,19 @@ def _padded(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     return torch.nn.functional.pad(torch.stack((a, b), dim=1), (0, 1)).flatten(1).contiguous()
 
 
-def _congruent_with_one_at(steps: torch.Tensor, pairs: Pairs, slack_m: float, shortest_m: float) -> torch.Tensor:
-    """(K, 2) number of the step and pair of the first half, where the pair's edge to the one that many further on is
-    as long in the cloud as in the model."""
+def _congruent_after(steps: torch.Tensor, pairs: Pairs, slack_m: float, shortest_m: float) -> torch.Tensor:
+    """(S, M/2) bool, whether a pair of the first half and the one that many steps further on are as far apart in the
+    cloud as in the model."""
     half = len(pairs) // 2
     twice = torch.cat((pairs.points, pairs.model_points), dim=1).T.contiguous()
-    rows, further = twice[:, :half], twice.unfold(1, half, 1)
-    found = []
-    for some in steps.split(max(1, AT_A_TIME // half)):
-        apart = further[:, some].sub_(rows.unsqueeze(1)).square_()
-        edge, model_edge = ((part[0] + part[1]).add_(part[2]).sqrt_() for part in (apart[:3], apart[3:]))
-        found.append(_congruent(edge, model_edge, slack_m, shortest_m))
-    return torch.cat(found).nonzero()
+    apart = twice.unfold(1, half, 1)[:, steps].sub_(twice[:, :half].unsqueeze(1)).square_()
+    edge, model_edge = ((part[0] + part[1]).add_(part[2]).sqrt_() for part in (apart[:3], apart[3:]))
+    return _congruent(edge, model_edge, slack_m, shortest_m)
 
 
 def _congruent(edge: torch.Tensor, model_edge: torch.Tensor, slack_m: float, shortest_m: float) -> torch.Tensor:
     """Which lengths in the cloud and in the model are alike, and no needle's."""
     return ((edge - model_edge).abs_() < slack_m) & (edge > shortest_m)
-
-
-def _differences(together: torch.Tensor, i: torch.Tensor, j: torch.Tensor) -> torch.Tensor:
-    """(K, 2) lengths of the edges from pairs i to pairs j, in the cloud and in the model."""
-    apart = together.index_select(0, i).sub_(together.index_select(0, j)).square_()
-    return apart.reshape(-1, 2, 4).sum(dim=2).sqrt_()
 
 
 def _spread(corners: torch.Tensor) -> torch.Tensor:

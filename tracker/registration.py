@@ -171,5 +171,5 @@ def _refit(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> tuple[
     inliers = closeness(pairs, motions, threshold_m) > 0
     supports = support(pairs, motions, threshold_m) / len(pairs)
     order = supports.argsort(descending=True, stable=True)
-    order = order[inliers.sum(dim=1)[order] > 2]
+    order = order[((inliers.sum(dim=1) > 2) & (supports > 0))[order]]
     return motions[order], inliers[order].float().mean(dim=1), supports[order]
