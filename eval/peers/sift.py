@@ -2,8 +2,8 @@
 
 opencv's SIFT in the mask's box, enlarged, as objects are small; matches by the ratio test within each reference view;
 open3d's RANSAC over their 3D points (three points, point to point, edge lengths checked) with a least-squares fit to
-its inliers; then point-to-plane ICP, which counts where no fewer matches agree with it than before. Confidence is the
-inlier share: of the matches, those whose points meet.
+its inliers; then point-to-plane ICP, which counts where no fewer matches agree with it than before, or the surface lay
+off the model. Confidence is the inlier share: of the matches, those whose points meet.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ class SiftConfig(BaseModel):
     contrast: SIFT's threshold. ratio: Lowe's. threshold_share: distance at which matched points meet, as a share of
     the diameter, at least threshold_m. iterations, confidence: of RANSAC. edge_similarity: of its edge check.
     least_matches, least_inliers: fewer are no pose. icp_steps, icp_reach_start, icp_reach_end: of the polish, shares of
-    the diameter. least_fitness: of the seen points that have to lie on the model afterwards. seed: of RANSAC."""
+    the diameter. least_fitness: of the seen points that have to lie on the model afterwards. lying: a surface of which
+    so much less lies on the model before the polish was off it. seed: of RANSAC."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -56,6 +57,7 @@ class SiftConfig(BaseModel):
     icp_reach_start: float = Field(default=0.06, gt=0)
     icp_reach_end: float = Field(default=0.025, gt=0)
     least_fitness: float = Field(default=0.4, ge=0, le=1)
+    lying: float = Field(default=0.02, ge=0, le=1)
     seed: int = 0
 
 
@@ -127,7 +129,8 @@ class SiftPose:
             polished = self._surface.icp(found.T_cam_obj, seen)
         if polished is None or polished.fitness < config.least_fitness:
             return f"poor fit: {polished.fitness if polished else 0:.2f} of the seen points lie on the model"
-        if self._agreeing(polished.T_cam_obj, points, model_points) < found.fitness:
+        lay = self._surface.fitness(found.T_cam_obj, seen) > polished.fitness - config.lying
+        if lay and self._agreeing(polished.T_cam_obj, points, model_points) < found.fitness:
             return found  # the surface slides in itself, as a can's does, and the print knows better
         return Fit(polished.T_cam_obj, found.fitness)
 
