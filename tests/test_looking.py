@@ -127,6 +127,17 @@ def test_what_is_far_from_where_it_was_expected_is_less_likely(
     assert surprising.grounds.turn_rad == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.parametrize(("off_m", "expected"), [(0.02, True), (0.4, False)])
+def test_what_is_found_about_where_somebody_pointed_was_expected_there(
+    off_m: float, expected: bool, can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    place_m = can_truth.translation_m + (off_m, 0, 0)
+    found = can_looking([Look(can_frames[0].masks[CAN], None, place_m=place_m)], can_frames[0])
+    assert isinstance(found, Found)
+    assert found.expected == expected
+    assert found.grounds.turn_rad is None  # a place has no pose that another could be turned from
+
+
 GOOD = Evidence(
     score=0.6, surface=0.9, colour=0.8, seen_through=0.0, outside=0.0, hidden=0.0, explained=0.9, proved=0.8
 )
@@ -163,7 +174,8 @@ def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
     origin = {"followed": "prediction", "turned": "turn"}.get(how, "search")
     refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
     grounds = Grounds(evidence, 0.01, None if how == "anywhere" else 0.02)
-    found = Found(Hypothesis(refined, evidence, origin, can_view), grounds, confidence, how == "masked")
+    expected, masked = how != "anywhere", how == "masked"
+    found = Found(Hypothesis(refined, evidence, origin, can_view), grounds, confidence, expected, masked)
     followed, config = how in ("followed", "turned", "jumped"), TrackerConfig()
     assert believed(found, followed, config) == (not said)
     assert said in doubt(found, followed, config)
@@ -172,6 +184,6 @@ def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
 
 def test_what_did_not_even_show_at_the_first_place_is_said_for_that(can_view: ObjectView) -> None:
     refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
-    found = Found(Hypothesis(refined, AIR, "search", can_view), Grounds(AIR, 0.01), 0.9, masked=False, missed="hidden")
+    found = Found(Hypothesis(refined, AIR, "search", can_view), Grounds(AIR, 0.01), 0.9, False, masked=False, missed="hidden")
     assert doubt(found, False, TrackerConfig()) == "hidden"
     assert doubt("out of view", True, TrackerConfig()) == "out of view"

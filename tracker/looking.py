@@ -7,12 +7,14 @@ from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeGuard, TypeVar
 
+import numpy as np
+
 from tracker.cloud import LEAST_POINTS, lift
 from tracker.concept import ConceptModel
 from tracker.confidence import Grounds, confidence, turn_sigma_rad
 from tracker.config import TrackerConfig
 from tracker.frame import Frame, Mask
-from tracker.geometry import Pose
+from tracker.geometry import Floats, Pose
 from tracker.saliency import Saliency
 from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
@@ -33,26 +35,29 @@ Asking = Generator[ObjectView, Saliency | None, T]
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
     """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. expected:
-    all poses that the object was expected at. masked: the pixels are known to be the object's; then it is looked for
-    in any pose too, where it is not clearly near the start. contested: the next look is to be compared with it, however
-    clear it is."""
+    all poses that the object was expected at. place_m: (3,) camera coordinates, where somebody said that it is, though
+    no pose could be told there. masked: the pixels are known to be the object's; then it is looked for in any pose too,
+    where it is not clearly near the start. contested: the next look is to be compared with it, however clear it is."""
 
     mask: Mask
     start: Pose | None
     expected: Sequence[Pose] = ()
+    place_m: Floats | None = None
     masked: bool = False
     contested: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """A pose, and what speaks for it. masked: by pixels that are known to be the object's. missed: why it did not even
+    """A pose, and what speaks for it. expected: it was about there, or somebody said that it is. masked: by pixels that
+    are known to be the object's. missed: why it did not even
     show at the first place where it was looked for; empty where something did. saliency: what concepts said there, None
     where surface and colours were enough."""
 
     hypothesis: Hypothesis
     grounds: Grounds
     confidence: float
+    expected: bool
     masked: bool
     missed: str = ""
     saliency: Saliency | None = None
@@ -89,7 +94,7 @@ def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
     was expected while it is followed than of what is seen again near there or has jumped, so that a state does not
     flicker; and most where nothing was expected."""
     seen, goes_on = found.hypothesis.evidence, found.masked or (followed and found.hypothesis.origin != "search")
-    out_of_nowhere = not goes_on and found.grounds.turn_rad is None
+    out_of_nowhere = not goes_on and not found.expected
     if seen.surface < LEAST_SURFACE:
         return f"{seen.surface:.0%} of what should be seen is in place"
     if out_of_nowhere and seen.hidden > MOST_HIDDEN:
@@ -106,7 +111,7 @@ class Looking:
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
-        self._search = Search(model, config)
+        self._search, self._centre_m = Search(model, config), model.points.mean(axis=0)
         self._without_concepts = 0  # looks in a row that did without
         self._usual = 0.0  # score of what was believed last
         self.waiting = False
@@ -195,9 +200,15 @@ class Looking:
 
     def _found(self, hypothesis: Hypothesis, look: Look) -> Found:
         grounds = self._grounds(hypothesis, look.expected)
-        found = Found(hypothesis, grounds, confidence(grounds), look.masked)
+        found = Found(hypothesis, grounds, confidence(grounds), self._expects(look, hypothesis), look.masked)
         self.tried.append(found)
         return found
+
+    def _expects(self, look: Look, hypothesis: Hypothesis) -> bool:
+        if look.place_m is None:
+            return bool(look.expected)
+        centre_m = (hypothesis.refined.T_cam_obj @ self._centre_m[None])[0]
+        return float(np.linalg.norm(centre_m - look.place_m)) < self._model.diameter_m
 
     def _grounds(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> Grounds:
         refined, symmetry = hypothesis.refined, self._model.symmetry

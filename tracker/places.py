@@ -77,7 +77,7 @@ class Places:
         elif self._where.known:
             yield from self._near(predicted if followed else None, now, look)
         elif (place_m := self._where.pointed_out_m(now.camera)) is not None:
-            yield Look(now.unclaimed(self._proposals.around(place_m, now.frame)), None)
+            yield Look(now.unclaimed(self._proposals.around(place_m, now.frame)), None, place_m=place_m)
         else:
             yield "not seen yet"
 
@@ -97,7 +97,9 @@ class Places:
             return "its concepts are not known yet"
         with now.clock("proposals"):
             masks = self._proposals.masks(picture, saliency, self._config.cloud)
-        return (yield from look.best([Look(now.unclaimed(mask), None) for mask in masks], now.frame, now.clock))
+        place_m = self._where.pointed_out_m(now.camera)
+        looks = [Look(now.unclaimed(mask), None, place_m=place_m) for mask in masks]
+        return (yield from look.best(looks, now.frame, now.clock))
 
     def suspected(self, T_then_obj: Pose, then: Landmarks | None, camera: CameraMotion) -> None:
         """It has been seen in this frame or in an earlier one."""
