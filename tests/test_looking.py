@@ -131,7 +131,7 @@ def test_what_is_far_from_where_it_was_expected_is_less_likely(
 def test_what_is_found_about_where_somebody_pointed_was_expected_there(
     off_m: float, expected: bool, can_looking: Counted, can_frames: list[Frame], can_truth: Pose
 ) -> None:
-    place_m = can_truth.translation_m + (off_m, 0, 0)
+    place_m = can_truth.translation_m + np.array((off_m, 0, 0))
     found = can_looking([Look(can_frames[0].masks[CAN], None, place_m=place_m)], can_frames[0])
     assert isinstance(found, Found)
     assert found.expected == expected
@@ -184,6 +184,7 @@ def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
 
 def test_what_did_not_even_show_at_the_first_place_is_said_for_that(can_view: ObjectView) -> None:
     refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
-    found = Found(Hypothesis(refined, AIR, "search", can_view), Grounds(AIR, 0.01), 0.9, False, masked=False, missed="hidden")
+    hypothesis = Hypothesis(refined, AIR, "search", can_view)
+    found = Found(hypothesis, Grounds(AIR, 0.01), 0.9, expected=False, masked=False, missed="hidden")
     assert doubt(found, False, TrackerConfig()) == "hidden"
     assert doubt("out of view", True, TrackerConfig()) == "out of view"
