@@ -24,7 +24,8 @@ class MatchingConfig(BaseModel):
     query_points: at most so many points of the cloud are matched, spread evenly over it (the paper's cap).
     per_point: how many points of the model each is matched to. mutual: keep only matches that are the best in both
     directions. kept: at most so many matches, those of the greatest margin.
-    memory_mb: bound on the block of the similarity matrix that is held at a time."""
+    memory_mb: bound on the block of the similarity matrix that is held at a time: one that a processor's cache holds is
+    searched sooner."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -35,7 +36,7 @@ class MatchingConfig(BaseModel):
     per_point: int = Field(default=1, ge=1, le=32)
     mutual: bool = False
     kept: int = Field(default=10_000, ge=3)
-    memory_mb: float = Field(default=64.0, ge=1)
+    memory_mb: float = Field(default=8.0, ge=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
