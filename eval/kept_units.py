@@ -22,7 +22,7 @@ from eval.predict import Tracked
 from eval.summary import TrackingCounts
 from eval.track_run import fingerprint_of
 from tracker.errors import OutputError
-from tracker.viewer import FRAMES, VIDEO
+from tracker.viewer import FRAMES, RECORDING, VIDEO
 
 log = logging.getLogger(__name__)
 
@@ -43,8 +43,8 @@ class KeptUnits:
             return []
 
     def drawn(self, fingerprint: str) -> list[Path]:
-        """The video and the folder of pictures, those that there are."""
-        return [path for name in (VIDEO, FRAMES) if (path := self.folder / fingerprint / name).exists()]
+        """What there is of a video, pictures and a recording for Rerun."""
+        return [path for name in (VIDEO, FRAMES, RECORDING) if (path := self.folder / fingerprint / name).exists()]
 
     def read(self, fingerprint: str) -> Tracked | None:
         """None where it is not kept, and, with a warning, where what is kept is damaged: it is made again then."""

@@ -6,7 +6,7 @@ It sees frames, and of the truth at most one pose an object and scene, where the
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
@@ -19,6 +19,7 @@ from eval.frame_record import FrameRecord
 from eval.instances import ObjectInImage
 from eval.peers import Method, method_kind, open_method
 from eval.summary import TrackingCounts
+from eval.symmetries import Motions
 from reference.completion import Completion
 from reference.onboard import onboard, read_reference_frames
 from reference.unposed import onboard_unposed, read_unposed_frames
@@ -38,6 +39,8 @@ from tracker.sources import PosedSource
 from tracker.viewer import NullViewer, Viewer
 
 log = logging.getLogger(__name__)
+
+DRAWN_STEPS = 180  # turns about an axis among which a true box is drawn
 
 Progress = Callable[[Iterable[Frame], int, str], Iterable[Frame]]
 
@@ -173,6 +176,8 @@ def track_scene(
     first_masks = FirstMasks()
     untold = [model.object_id for model in models] if protocol.initialisation == "gt" else []
     shown = viewer(models)
+    drawn = [] if isinstance(shown, NullViewer) else [model.object_id for model in models]
+    alike = {object_id: dataset.model(object_id).symmetries.motions(DRAWN_STEPS) for object_id in drawn}
     frames = InOrder(progress(source, len(source), f"scene {scene_id}"))
     steps: list[tuple[int, Sequence[TrackResult]]] = []
     try:
@@ -182,7 +187,7 @@ def track_scene(
                 untold.remove(object_id)
             given = frame if protocol.config.masks == "given" else first_masks(frame)
             results = tracker.step(given)
-            shown.show(frame, results, truth[frame.index])
+            shown.show(frame, results, _as_it_looks(truth[frame.index], results, alike))
             if growing:
                 growing.take(frame, results)
             steps.append((frame.index, [result.slim() for result in results]))
@@ -194,6 +199,22 @@ def track_scene(
         seen = [(index, result.object_id) in visible for result in results]
         _record(tracked, dataset, scene_id, index, results, seen, protocol)
     return tracked
+
+
+def _as_it_looks(
+    truth: Mapping[str, Pose], results: Sequence[TrackResult], alike: Mapping[str, Motions]
+) -> dict[str, Pose]:
+    """The true poses, each in the way that its object's symmetry makes the nearest to the estimate: a bowl's box that
+    is turned about its axis is drawn on the estimated one, as nobody can see that it is turned. alike: of the objects
+    that are drawn."""
+    poses = dict(truth)
+    for result in results:
+        if result.pose is not None and result.object_id in truth and result.object_id in alike:
+            T_cam_obj, motions = truth[result.object_id], alike[result.object_id]
+            cosines = np.einsum("ij,sij->s", T_cam_obj.rotation.T @ result.pose.rotation, motions.turns)
+            k = int(cosines.argmax())
+            poses[result.object_id] = T_cam_obj @ Pose(motions.turns[k], motions.shifts_m[k])
+    return poses
 
 
 class _Growing:

@@ -16,7 +16,7 @@ from eval.spread import Spreading, spread
 from eval.track_run import TrackRun, code_fingerprint, fingerprint_of, opened_backend, opened_dataset
 from tracker.errors import ConfigError, TrackerError
 from tracker.threads import torch_threads
-from tracker.viewer import overlay_viewer
+from tracker.viewer import file_viewer
 
 Item = TypeVar("Item")
 Outcome = Tracked | TrackerError
@@ -26,7 +26,7 @@ UnitsShown = Callable[[Iterable[tuple[int, Outcome]], int, str], Iterable[tuple[
 @dataclass(frozen=True, slots=True, eq=False)
 class Unit:
     """A scene of a run. decided_by: as `TrackRun.decided_by`, and what is drawn of it. code: of the process that
-    made the unit. views: what is drawn, as `overlay_viewer` has it, into the folder where the unit is kept."""
+    made the unit. views: what is drawn, as `file_viewer` has it, into the folder where the unit is kept."""
 
     run: TrackRun
     scene_id: int
@@ -106,7 +106,7 @@ def _finished(item: tuple[Unit, Path | None], frames_shown: Progress | None = No
         if code_fingerprint() != unit.code:
             raise ConfigError(f"{platform.node()} would track with other source code than this: install the same there")
         dataset, protocol = opened_dataset(unit.run.dataset), unit.run.protocol()
-        viewer = partial(overlay_viewer, unit.views, folder)
+        viewer = partial(file_viewer, unit.views, folder)
         with torch_threads(unit.run.threads):
             objects, shown = unit.run.object_ids, frames_shown or _not_shown
             return track_scene(dataset, unit.scene_id, protocol, objects, viewer, shown)

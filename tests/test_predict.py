@@ -272,6 +272,22 @@ def test_the_viewer_gets_every_frame_with_its_truth_and_is_closed(protocol: Prot
         assert np.array_equal(truth[BOX].matrix, sighting.T_cam_obj.matrix)
 
 
+def test_the_viewer_gets_the_truth_of_a_symmetric_object_turned_as_the_estimate_is(protocol: Protocol) -> None:
+    shown, bowl = Silent(), open_synthetic("tabletop?size=320x240&frames=8")
+    each_alone = replace(protocol, config=TrackerConfig(prior=False))
+    track_dataset(bowl, each_alone, object_ids=["bowl"], viewer=lambda *_: shown)
+    (axis,) = bowl.model("bowl").symmetries.axes
+    off_rad = np.zeros((0, 2))
+    for truth, result, sighting in zip(shown.truth, shown.results, bowl.scene(1).sightings("bowl"), strict=True):
+        assert result.pose is not None
+        assert truth["bowl"].rotation @ axis == pytest.approx(sighting.T_cam_obj.rotation @ axis)
+        assert truth["bowl"].distance_to_m(sighting.T_cam_obj) < 1e-9
+        off = [pose.angle_to_rad(result.pose) for pose in (truth["bowl"], sighting.T_cam_obj)]
+        off_rad = np.vstack((off_rad, off))
+    drawn_rad, true_rad = off_rad.max(axis=0)
+    assert true_rad > 2 * drawn_rad
+
+
 def test_the_viewer_is_closed_too_where_a_frame_cannot_be_read(protocol: Protocol) -> None:
     def broken(frame: Frame) -> Frame:
         if frame.index == 5 and shown.frames:

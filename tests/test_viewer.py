@@ -14,7 +14,7 @@ from tracker.errors import OutputError
 from tracker.frame import Frame
 from tracker.geometry import Intrinsics, Pose
 from tracker.result import TrackResult, TrackState
-from tracker.viewer import FRAMES, VIDEO, NullViewer, OverlayFiles, Several, Viewer, overlay_viewer
+from tracker.viewer import FRAMES, RECORDING, VIDEO, NullViewer, OverlayFiles, Several, Viewer, file_viewer
 
 CAMERA = Intrinsics(300.0, 310.0, 158.0, 121.5, 320, 240)
 T_CAM_OBJ = Pose.exp((0.4, -0.5, 0.3, 0.0, 0.0, 0.0)).nudged(np.array([0, 0, 0, 0.02, 0.04, 0.6]))
@@ -64,7 +64,7 @@ def test_the_video_can_be_read_back_frame_by_frame(camera: Intrinsics, tmp_path:
 
 
 def test_pictures_are_named_by_the_frame_and_hold_it_exactly(tmp_path: Path) -> None:
-    viewer = overlay_viewer(("frames",), tmp_path, [model()])
+    viewer = file_viewer(("frames",), tmp_path, [model()])
     for index in (3, 12):
         viewer.show(plain(index % 8), [], {})
         viewer.show(plain(index % 8), [result()], {})
@@ -76,17 +76,19 @@ def test_pictures_are_named_by_the_frame_and_hold_it_exactly(tmp_path: Path) -> 
     assert (picture[60:200, 60:260, ::-1] != (200, 90, 20)).any()
 
 
-@pytest.mark.parametrize("views", [(), ("overlay",), ("frames",), ("overlay", "frames")])
+@pytest.mark.parametrize("views", [(), ("overlay",), ("frames",), ("rrd",), ("overlay", "frames", "rrd")])
 def test_what_is_asked_for_is_made_and_nothing_else(views: tuple[str, ...], tmp_path: Path) -> None:
-    viewer = overlay_viewer(views, tmp_path, [model()])
+    if "rrd" in views:
+        pytest.importorskip("rerun")
+    viewer = file_viewer(views, tmp_path, [model()])
     viewer.show(plain(), [result()], {"thing": T_CAM_OBJ})
     viewer.close()
-    made = {"overlay": VIDEO, "frames": FRAMES}
+    made = {"overlay": VIDEO, "frames": FRAMES, "rrd": RECORDING}
     assert {path.name for path in tmp_path.iterdir()} == {made[view] for view in views}
 
 
 def test_pictures_of_no_frames_are_no_files(tmp_path: Path) -> None:
-    overlay_viewer(("overlay", "frames"), tmp_path, [model()]).close()
+    file_viewer(("overlay", "frames"), tmp_path, [model()]).close()
     assert list(tmp_path.iterdir()) == []
 
 
@@ -99,7 +101,7 @@ def show_and_close(viewer: Viewer) -> None:
 @pytest.mark.parametrize("view", ["overlay", "frames"])
 def test_what_cannot_be_written_is_an_error(view: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("no folder")
-    viewer = overlay_viewer((view,), tmp_path / "file", [model()])
+    viewer = file_viewer((view,), tmp_path / "file", [model()])
     with pytest.raises(OutputError, match="cannot"):
         show_and_close(viewer)
     viewer.close()

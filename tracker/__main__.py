@@ -190,9 +190,9 @@ class Track:
         """Raises as `RerunLog` does, and OutputError where its file is there already."""
         from tracker.output import require_free
         from tracker.rerun_log import RerunLog
-        from tracker.viewer import Several, overlay_viewer
+        from tracker.viewer import Several, file_viewer
 
-        drawn, window = overlay_viewer(self.view, folder, models), "rerun" in self.view
+        drawn, window = file_viewer(self.view, folder, models), "rerun" in self.view
         if not window and self.rrd is None:
             return drawn
         if self.rrd is not None:

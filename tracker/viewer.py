@@ -22,7 +22,7 @@ from tracker.video import VideoFile
 
 FALLBACK_RATE_HZ = 30.0
 MOST_WAITING = 8  # frames that are to be drawn yet
-VIDEO, FRAMES = "overlay.mp4", "frames"  # in a folder of results
+VIDEO, FRAMES, RECORDING = "overlay.mp4", "frames", "run.rrd"  # in a folder of results
 
 
 class Viewer(Protocol):
@@ -43,11 +43,19 @@ class NullViewer:
         pass
 
 
-def overlay_viewer(views: Collection[str], folder: Path | None, models: Sequence[ConceptModel]) -> Viewer:
-    """Of the views "overlay" and "frames", the video and the folder of pictures; one that shows nothing without any."""
-    video = folder / VIDEO if folder and "overlay" in views else None
-    pictures = folder / FRAMES if folder and "frames" in views else None
-    return OverlayFiles(models, video, pictures) if video or pictures else NullViewer()
+def file_viewer(views: Collection[str], folder: Path | None, models: Sequence[ConceptModel]) -> Viewer:
+    """Of the views "overlay", "frames" and "rrd", the video, the folder of pictures and the recording for Rerun; one
+    that shows nothing without any. Raises MissingExtraError for a recording without the package rerun-sdk."""
+    if folder is None:
+        return NullViewer()
+    video = folder / VIDEO if "overlay" in views else None
+    pictures = folder / FRAMES if "frames" in views else None
+    viewers: list[Viewer] = [OverlayFiles(models, video, pictures)] if video or pictures else []
+    if "rrd" in views:
+        from tracker.rerun_log import RerunLog
+
+        viewers.append(RerunLog(models, folder / RECORDING))
+    return Several(viewers) if viewers else NullViewer()
 
 
 class Several:

@@ -69,9 +69,10 @@ class Track:
     """YAML file with settings that differ from the defaults."""
     out: Path | None = None
     """Folder for scores.json, results.csv, report.html, report.md, config.yaml and what --view makes."""
-    view: Annotated[tuple[Literal["overlay", "frames"], ...], tyro.conf.UseAppendAction] = ()
+    view: Annotated[tuple[Literal["overlay", "frames", "rrd"], ...], tyro.conf.UseAppendAction] = ()
     """overlay: write overlay.mp4 to the --out folder (one for each of several scenes), estimates orange, truth green;
-    H.264 where the program ffmpeg is installed. frames: write a PNG a frame to its folder frames. Once for each."""
+    H.264 where the program ffmpeg is installed. frames: write a PNG a frame to its folder frames. rrd: write run.rrd
+    there, all that was seen and said, for Rerun (extra rerun). Once for each."""
     overwrite: bool = False
     """Replace results that are in the --out folder, and forget a run that did not end."""
     resume: bool = False
@@ -113,7 +114,7 @@ class Track:
             raise ConfigError(f"--view {self.view[0]} needs a folder to write to: give --out DIR")
         if self.view and self.cluster is not None:
             raise ConfigError(
-                f"--view {self.view[0]} draws where the frames are tracked: it goes with --jobs, not --cluster"
+                f"--view {self.view[0]} writes where the frames are tracked: it goes with --jobs, not --cluster"
             )
         if self.resume and self.out is None:
             raise ConfigError("--resume goes on with what is beside a folder: give --out DIR")
