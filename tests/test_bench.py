@@ -17,10 +17,11 @@ from eval.bench.registration import RegistrationBench
 from eval.bench.saliency import SaliencyBench
 from eval.bench.scored_models import OBJECTS, model, poses
 from eval.bench.scoring import ScoringBench
+from eval.bench.soak import SoakBench
 from eval.symmetric_errors import mssd
 from tests.tiny_networks import save_siglip
 from tracker.declared_symmetry import parse_symmetry
-from tracker.errors import OutputError
+from tracker.errors import ConfigError, OutputError
 from tracker.geometry import Pose
 from tracker.symmetry import NO_SYMMETRY, about
 
@@ -126,3 +127,16 @@ def test_the_saliency_bench_says_everything_that_it_is_asked_for(
     assert figures["speedup_over_loop"] > 0
     assert figures["speedup_over_grad_cam"] is None
     assert figures["weights"] == weights
+
+
+def test_the_soak_bench_follows_all_objects_and_says_what_became_of_memory_and_speed(tmp_path: Path) -> None:
+    bench = SoakBench(frames=12, objects=2, settled=4, size="320x240", json=tmp_path / "figures.json")
+    bench()
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert figures["tracked"] == 1
+    assert len(figures["settings"]["objects"]) == 2
+    assert figures["slowdown"] > 0
+    assert figures["growth"] >= 0
+    assert all(megabytes > 0 for megabytes in figures["resident_mb"])
+    with pytest.raises(ConfigError, match="--frames"):
+        SoakBench(frames=5, settled=4)()

@@ -1,0 +1,107 @@
+"""`python -m eval bench soak`: does a tracker that runs for long keep its memory and its speed?"""
+
+from __future__ import annotations
+
+import itertools
+import resource
+import statistics
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+from rich.table import Table
+
+from tracker.terminal import STDERR, hush, progress
+
+if TYPE_CHECKING:
+    from tracker.frame import Frame
+
+SCENE, RENDERED = "tabletop", 60
+VIEWS = 3
+RATE_HZ = 30
+STATM = Path("/proc/self/statm")
+
+
+@dataclass
+class SoakBench:
+    """Carry the masks of several objects through thousands of frames, a rendered scene forth and back, and compare
+    memory and speed after the first of them with those at the end."""
+
+    frames: int = 10_000
+    """How many are tracked."""
+    objects: int = 5
+    """How many objects there are in each, six at most."""
+    settled: int = 500
+    """Frames after which memory and speed are to stay as they are."""
+    size: str = "640x480"
+    """Of the pictures."""
+    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File for the figures."""
+    overwrite: bool = False
+    """Replace the file if it exists."""
+    quiet: bool = False
+    """Nothing on the terminal but warnings and errors."""
+
+    def __call__(self) -> None:
+        from eval.environment import write_figures
+        from tracker.errors import ConfigError
+        from tracker.output import require_free
+
+        hush(self.quiet)
+        if self.frames < 2 * self.settled or self.settled < 1:
+            raise ConfigError(f"--frames: at least twice the {self.settled} settled ones are needed, got {self.frames}")
+        if self.json:
+            require_free(self.json, self.overwrite)
+        figures = self.measured()
+        table = Table("", "", title=f"{self.frames} frames, {self.objects} objects", show_header=False)
+        for name, value in figures.items():
+            table.add_row(name.replace("_", " "), f"{value:.4g}" if isinstance(value, float) else str(value))
+        STDERR.print(table)
+        if self.json:
+            write_figures(self.json, figures)
+
+    def measured(self) -> dict[str, Any]:
+        from reference.onboard import onboard, read_reference_frames
+        from tracker.config import TrackerConfig
+        from tracker.pipeline import ObjectTracker
+        from tracker.saliency import open_backend
+        from tracker.sources.synthetic import open_scene
+
+        scene, backend = open_scene(f"{SCENE}?frames={RENDERED}&size={self.size}"), open_backend("attributes")
+        object_ids = scene.object_ids[: self.objects]
+        models = [onboard(read_reference_frames(scene, object_id, VIEWS), backend) for object_id in object_ids]
+        tracker = ObjectTracker(models, TrackerConfig(masks="carried"), backend)
+        spent_ms: list[float] = []
+        resident_mb, tracked = [], 0
+        for frame in progress(_forth_and_back(list(scene), self.frames), self.frames, "frames"):
+            start_s = time.perf_counter()
+            results = tracker.step(frame)
+            spent_ms.append((time.perf_counter() - start_s) * 1e3)
+            resident_mb.append(_resident_mb())
+            tracked += sum(result.pose is not None for result in results)
+        early, late = spent_ms[self.settled : 2 * self.settled], spent_ms[-self.settled :]
+        return {
+            "frames_per_s": 1e3 / statistics.median(spent_ms),
+            "median_ms": statistics.median(spent_ms),
+            "p95_ms": statistics.quantiles(spent_ms, n=20)[-1],
+            "slowdown": statistics.median(late) / statistics.median(early),
+            "resident_mb": [resident_mb[self.settled], resident_mb[-1]],
+            "growth": max(resident_mb[self.settled :]) / resident_mb[self.settled] - 1,
+            "tracked": tracked / (self.frames * len(models)),
+            "settings": {"frames": self.frames, "objects": list(object_ids), "size": self.size},
+        }
+
+
+def _forth_and_back(rendered: Sequence[Frame], count: int) -> Iterator[Frame]:
+    """So many frames in which nothing jumps; masks are in the first alone."""
+    turning = itertools.cycle([*rendered, *rendered[-2:0:-1]])
+    for index, frame in enumerate(itertools.islice(turning, count)):
+        masks = frame.masks if index == 0 else {}
+        yield replace(frame, index=index, stamp_ns=index * 10**9 // RATE_HZ, masks=masks)
+
+
+def _resident_mb() -> float:
+    return int(STATM.read_text().split()[1]) * resource.getpagesize() / 2**20
