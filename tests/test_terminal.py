@@ -5,7 +5,10 @@ from __future__ import annotations
 import io
 import json
 import logging
+import os
 import re
+import signal
+import threading
 
 import pytest
 from rich.console import Console
@@ -93,3 +96,17 @@ def test_json_is_one_line_that_can_be_read(capsys: pytest.CaptureFixture[str]) -
     assert json.loads(said) == {"a": [1.5, None], "b": "ü\n"}
     with pytest.raises(ValueError, match="JSON"):
         say_json(float("nan"))
+
+
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_program_that_is_ended_says_so_and_how(screen: io.StringIO, sent: signal.Signals, code: int) -> None:
+    def program() -> None:
+        os.kill(os.getpid(), sent)
+        threading.Event().wait(10)
+
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(SystemExit) as ended:
+        run(program)
+    assert ended.value.code == code
+    assert "stopped" in plain(screen.getvalue())
+    assert signal.getsignal(signal.SIGTERM) is before

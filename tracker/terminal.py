@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
@@ -18,9 +19,15 @@ STDERR, ALWAYS = Console(stderr=True), Console(stderr=True)  # ALWAYS is heard w
 Item = TypeVar("Item")
 
 
+class Terminated(KeyboardInterrupt):
+    """Somebody else ends the program, as a service manager does: as ctrl-C would."""
+
+
 def run(program: Callable[[], None]) -> None:
-    """Run a command to its end. A TrackerError is told in a sentence, exit code 1; ctrl-C gives 130."""
+    """Run a command to its end. A TrackerError is told in a sentence, exit code 1; ctrl-C gives 130, SIGTERM 143, where
+    the command does not end in its own way then."""
     STDERR.quiet = False
+    before = signal.signal(signal.SIGTERM, _terminate)
     handler = RichHandler(console=ALWAYS, show_path=False, show_time=False)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     try:
@@ -28,9 +35,15 @@ def run(program: Callable[[], None]) -> None:
     except TrackerError as error:
         ALWAYS.print(f"[bold red]error:[/] {_plain(str(error))}", highlight=False, soft_wrap=True)
         sys.exit(1)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         ALWAYS.print("stopped")
-        sys.exit(130)
+        sys.exit(128 + (signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _terminate(*_: object) -> None:
+    raise Terminated
 
 
 def hush(quiet: bool) -> None:
