@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -815,3 +817,19 @@ def test_quiet_they_say_nothing_but_what_is_wrong(
     said = run(*command, "--quiet")
     assert (said.code, said.out) == (0, "")
     assert [line for line in said.err.splitlines() if "model of object" not in line and "reference" not in line] == []
+
+
+def test_a_tracker_that_is_killed_leaves_no_results_and_another_run_gives_them(model: Path, tmp_path: Path) -> None:
+    line = ("tracker", SOURCE, "--model", model, "--out", tmp_path / "out", "--quiet")
+    running = subprocess.Popen([sys.executable, "-m", *map(str, line)])  # noqa: S603
+    while running.poll() is None and not any(path.stat().st_size for path in tmp_path.glob(".out.*/poses.jsonl")):
+        time.sleep(0.002)
+    running.kill()
+    assert running.wait() == -signal.SIGKILL, "it ended before it could be killed"
+    assert not (tmp_path / "out").exists()
+    said = process(*line)
+    assert said.code == 0
+    assert f".out.{running.pid}.partial" in "".join(said.err.split())
+    lines = (tmp_path / "out" / "poses.jsonl").read_text().splitlines()
+    assert [json.loads(line)["frame"] for line in lines] == list(range(len(lines)))
+    assert len(lines) == 6

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from io import StringIO
@@ -59,6 +62,20 @@ def test_an_error_on_the_way_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="half-written"):
         write(tmp_path / "out", "one", error=SourceError("frame 7 is half-written"))
     assert names(tmp_path) == []
+
+
+def test_what_a_killed_run_had_written_is_named_and_stays_and_what_another_one_writes_is_not(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    (tmp_path / f".out.{ended.pid}.partial").mkdir()
+    (tmp_path / f".out.{os.getppid()}.partial").mkdir()
+    (tmp_path / f".out.{os.getpid()}.partial").mkdir()  # of an earlier process of the same number
+    write(tmp_path / "out", "one")
+    assert names(tmp_path) == sorted([f".out.{ended.pid}.partial", f".out.{os.getppid()}.partial", "out"])
+    (warning,) = caplog.messages
+    assert f".out.{ended.pid}.partial" in warning
 
 
 def test_results_that_are_there_are_not_overwritten_without_being_asked_to(earlier: Path) -> None:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tracker.errors import OutputError
@@ -42,3 +46,25 @@ def test_a_file_in_the_way_of_its_folder_is_said(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
     with pytest.raises(OutputError, match=r"taken/file\.txt: cannot be written"):
         write_whole(tmp_path / "taken" / "file.txt", "x")
+
+
+def test_killed_at_any_moment_it_is_what_one_of_the_writings_was(tmp_path: Path) -> None:
+    path, size = tmp_path / "file.bin", 20_000_000
+    code = f"""
+import sys
+from itertools import count
+from pathlib import Path
+from tracker.whole_file import write_whole
+for k in count():
+    write_whole(Path(sys.argv[1]), bytes([k % 250]) * {size})
+"""
+    for after_s in np.random.default_rng(0).uniform(0, 0.1, 3):
+        running = subprocess.Popen([sys.executable, "-c", code, str(path)])  # noqa: S603
+        while not path.exists():
+            time.sleep(0.005)
+        time.sleep(after_s)
+        running.kill()
+        running.wait()
+        content = path.read_bytes()
+        assert content == content[:1] * size
+        path.unlink()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
+import re
 import shutil
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,16 +19,22 @@ from tracker.region import Region, SeenRegion
 from tracker.result import TrackResult
 from tracker.smoothing import smooth_results
 
+log = logging.getLogger(__name__)
+
 
 @contextmanager
 def result_folder(path: str | Path, overwrite: bool) -> Iterator[Path]:
     """A folder to write into, which takes the place of `path` when the block ends without an error.
 
-    Raises OutputError at once where `path` holds something already and `overwrite` is False.
+    What a run that was killed had written is named, and stays. Raises OutputError at once where `path` holds something
+    already and `overwrite` is False.
     """
     path = Path(path).resolve()
     require_free(path, overwrite)
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    shutil.rmtree(partial, ignore_errors=True)  # of a process that had this number before
+    for left in _left_behind(path):
+        log.warning("%s is what a run that was killed had written: have a look, and remove it", left)
     try:
         partial.mkdir(parents=True)
         yield partial
@@ -35,6 +43,25 @@ def result_folder(path: str | Path, overwrite: bool) -> Iterator[Path]:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def _left_behind(path: Path) -> list[Path]:
+    """Folders of processes that are no more."""
+    if not path.parent.is_dir():
+        return []
+    kind = re.compile(rf"\.{re.escape(path.name)}\.(\d+)\.partial")
+    found = {name: match for name in sorted(os.listdir(path.parent)) if (match := kind.fullmatch(name))}
+    return [path.with_name(name) for name, match in found.items() if not _runs(int(match[1]))]
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # somebody else's
+        return True
+    return True
 
 
 def _move_into_place(partial: Path, path: Path) -> None:
