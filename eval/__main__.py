@@ -10,6 +10,7 @@ import tyro
 from eval.commands.ablate import Ablate
 from eval.commands.bench import Bench
 from eval.commands.calibrate import Calibrate
+from eval.commands.losses import Losses
 from eval.commands.pairs import Pairs
 from eval.commands.plate import Plate
 from eval.commands.scenarios import Scenarios
@@ -25,6 +26,7 @@ def main() -> None:
                 "track": Track,
                 "score": Score,
                 "pairs": Pairs,
+                "losses": Losses,
                 "scenarios": Scenarios,
                 "calibrate": Calibrate,
                 "ablate": Ablate,

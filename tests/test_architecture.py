@@ -33,7 +33,7 @@ ORDER = {
         "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",
         "pose_filter", "config", "result", "smoothing", "stopwatch", "search", "looking", "lockstep", "places",
         "reviews", "track", "pipeline", "remote_control", "bop_rows", "pose_files", "ros_results", "output",
-        "saved_run", "overlay", "video", "viewer", "web", "rerun_log", "terminal", "__main__",
+        "saved_run", "overlay", "video", "rerun_log", "viewer", "web", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "planes",

@@ -17,6 +17,7 @@ from tracker.errors import OutputError
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.overlay import draw_overlay, shapes_of
+from tracker.rerun_log import RerunLog
 from tracker.result import TrackResult
 from tracker.video import VideoFile
 
@@ -52,8 +53,6 @@ def file_viewer(views: Collection[str], folder: Path | None, models: Sequence[Co
     pictures = folder / FRAMES if "frames" in views else None
     viewers: list[Viewer] = [OverlayFiles(models, video, pictures)] if video or pictures else []
     if "rrd" in views:
-        from tracker.rerun_log import RerunLog
-
         viewers.append(RerunLog(models, folder / RECORDING))
     return Several(viewers) if viewers else NullViewer()
 

@@ -1,0 +1,1 @@
+"""Why is a pose wrong? The first stage that would have to do better, and what it costs."""
