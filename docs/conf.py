@@ -15,6 +15,6 @@ html_theme = "furo"
 html_title = "conceptrack"
 html_copy_source = html_show_sourcelink = html_show_copyright = False
 html_static_path = ["static"]
-html_css_files = ["wide.css"]
+html_css_files = ["tables.css"]
 pygments_style, pygments_dark_style = "default", "monokai"
 suppress_warnings = ["config.cache"]
