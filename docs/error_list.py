@@ -75,7 +75,7 @@ class ErrorList(SphinxDirective):
     """A section a kind of error, in it the messages by module."""
 
     def run(self) -> list[nodes.Node]:
-        told = sorted(message for message in messages() if not message.is_passed_on)
+        told = [message for message in messages() if not message.is_passed_on]
         for path in ROOT.glob("*/errors.py"):
             self.env.note_dependency(str(path))
         return [self._section(kind, what, [m for m in told if m.kind == kind]) for kind, what in kinds().items()]
