@@ -58,11 +58,11 @@ def run_page(
 ) -> Iterator[Callable[[str], Page]]:
     """In an empty folder; the tables of plug-ins, into which a page puts its own, are as they were afterwards."""
     monkeypatch.chdir(tmp_path)
-    kept = [(table, dict(table)) for table in (BACKENDS, SOURCES)]
+    backends, sources = dict(BACKENDS), dict(SOURCES)
     yield lambda name: Page(name, capsys)
-    for table, before in kept:
-        table.clear()
-        table.update(before)
+    for table, before in ((BACKENDS, backends), (SOURCES, sources)):
+        for name in table.keys() - before.keys():
+            del table[name]
 
 
 def test_there_is_python_on_the_pages_that_need_it() -> None:
