@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracker.geometry import Floats, Intrinsics, Pose
+from tracker.system_libraries import system_libraries_of
 
 DELTA_M = 0.015  # by how much a surface may lie behind what the camera measured and still count as seen
 TAUS = np.arange(1, 11) / 20  # of the diameter: 0.05, 0.10 .. 0.50
@@ -22,7 +23,8 @@ class SurfaceRenderer:
     """Distance images of one mesh. vertices_m: (N, 3) object coordinates. triangles: (M, 3) indices into them."""
 
     def __init__(self, vertices_m: Floats, triangles: npt.NDArray[np.integer]) -> None:
-        import open3d as o3d
+        with system_libraries_of("open3d"):
+            import open3d as o3d
 
         self._scene: Any = o3d.t.geometry.RaycastingScene()
         self._scene.add_triangles(np.float32(vertices_m), np.ascontiguousarray(triangles, np.uint32))

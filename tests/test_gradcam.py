@@ -18,6 +18,7 @@ from tracker.saliency.siglip2 import SiglipEncoder, square
 
 LABELS = ("handle", "rim", "lid", "label", "red spout", "body")
 OPTIONS = {"device": "cpu"}
+ENCODERS: dict[str, Any] = {"siglip2": SiglipEncoder, "clip": ClipEncoder, "dinotxt": DinotxtEncoder}
 
 
 def pictures(count: int) -> torch.Tensor:
@@ -96,6 +97,20 @@ def test_clip_maps_are_those_of_a_backward_pass_a_concept(folders: dict[str, Pat
     layer = network.vision_model.encoder.layers[-1].layer_norm1
     expected = one_by_one(network, layer, score, len(LABELS), lambda tokens: square(tokens[:, 1:]))
     assert_same_maps(encoder.maps(pictures(2), texts), expected)
+
+
+@pytest.mark.parametrize("name", ENCODERS)
+def test_maps_of_half_precision_as_on_a_gpu_are_those_of_full_precision(
+    name: str, folders: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = BackendOptions(str(folders[name]), "cpu")
+    full = ENCODERS[name](options)
+    monkeypatch.setattr(f"tracker.saliency.{name}.precision", lambda device: torch.float16)  # noqa: ARG005
+    half = ENCODERS[name](options)
+    expected, found = (encoder.maps(pictures(2), texts_of(encoder).float()).float() for encoder in (full, half))
+    assert found.shape == expected.shape
+    assert torch.allclose(found, expected, atol=0.02)
+    assert (expected.amax(dim=(2, 3)) == 1).any()  # there is something in them
 
 
 def test_dinotxt_maps_are_cosines_with_the_second_half_of_a_text(folders: dict[str, Path]) -> None:

@@ -1,4 +1,4 @@
-"""The README's own lines run, and what it names exists."""
+"""The README's ten lines of Python; `tests/test_documents.py` has its commands and links."""
 
 from __future__ import annotations
 
@@ -26,20 +26,3 @@ def test_its_ten_lines_of_python_track_the_sequence(capsys: pytest.CaptureFixtur
 def test_its_python_tells_the_shapes_of_what_it_makes() -> None:
     code = [line for line in python_block().splitlines() if line and not line.startswith(("from", "tracker ="))]
     assert all("#" in line for line in code)
-
-
-def test_its_links_and_pictures_are_there() -> None:
-    targets = [target for target in re.findall(r"\]\(([^)]+)\)", README) if "://" not in target]
-    assert targets
-    assert not [target for target in targets if not (ROOT / target).exists()]
-
-
-@pytest.mark.parametrize("program", ["reference", "tracker", "eval"])
-def test_every_option_that_it_shows_is_an_option_of_the_program(program: str) -> None:
-    shown = {
-        option for line in re.findall(rf"python -m {program} .*", README) for option in re.findall(r"--[a-z]+", line)
-    }
-    source = "\n".join(path.read_text() for path in (ROOT / program).rglob("*.py"))
-    assert shown
-    named = {f"--{name}" for name in re.findall(r'tyro\.conf\.arg\(name="([a-z]+)"', source)}
-    assert {o for o in shown - named if not re.search(rf"^    {o[2:]}: .*\n    \"\"\"", source, re.MULTILINE)} == set()

@@ -41,3 +41,7 @@ class OutputError(TrackerError):
 
 class MissingExtraError(TrackerError):
     """An optional package is needed; the message has the command that installs it."""
+
+
+class MissingLibraryError(TrackerError):
+    """A library of the operating system is needed; the message has the command that installs it."""

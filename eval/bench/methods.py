@@ -14,6 +14,7 @@ from tracker.errors import FrameError
 from tracker.geometry import Floats, Pose
 from tracker.hypotheses import Pairs
 from tracker.registration import RegistrationConfig, register_pairs
+from tracker.system_libraries import system_libraries_of
 
 Method = Callable[[Problem, int], Pose | None]  # the problem and a seed
 
@@ -35,7 +36,8 @@ def ours(confidence: float, samples: int = SAMPLES) -> Method:
 
 def open3d_ransac(confidence: float, samples: int = SAMPLES, checkers: bool = True) -> Method:
     """Point to point, three points; edges alike to 0.9 and distances under the threshold where there are checkers."""
-    import open3d as o3d
+    with system_libraries_of("open3d"):
+        import open3d as o3d
 
     reg = o3d.pipelines.registration
     tests = [reg.CorrespondenceCheckerBasedOnEdgeLength(0.9), reg.CorrespondenceCheckerBasedOnDistance(THRESHOLD_M)]
@@ -54,7 +56,8 @@ def open3d_ransac(confidence: float, samples: int = SAMPLES, checkers: bool = Tr
 
 def open3d_fgr() -> Method:
     """Fast global registration; its distance is half the threshold, as its authors' examples have it."""
-    import open3d as o3d
+    with system_libraries_of("open3d"):
+        import open3d as o3d
 
     reg = o3d.pipelines.registration
     option = reg.FastGlobalRegistrationOption(maximum_correspondence_distance=THRESHOLD_M / 2)

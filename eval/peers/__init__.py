@@ -17,6 +17,7 @@ from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.result import TrackResult
 from tracker.saliency import SaliencyBackend
+from tracker.system_libraries import system_libraries_of
 
 
 class Method(Protocol):
@@ -75,25 +76,29 @@ def _ours() -> MethodKind:
 
 
 def _sift() -> MethodKind:
-    from eval.peers.sift import SiftConfig, open_sift
+    with system_libraries_of("open3d"):
+        from eval.peers.sift import SiftConfig, open_sift
 
     return MethodKind(open_sift, "ignored", False, SiftConfig().model_dump(mode="json"))
 
 
 def _fpfh() -> MethodKind:
-    from eval.peers.fpfh import FpfhConfig, open_fpfh
+    with system_libraries_of("open3d"):
+        from eval.peers.fpfh import FpfhConfig, open_fpfh
 
     return MethodKind(open_fpfh, "ignored", False, FpfhConfig().model_dump(mode="json"))
 
 
 def _icp() -> MethodKind:
-    from eval.peers.icp import IcpConfig, open_icp
+    with system_libraries_of("open3d"):
+        from eval.peers.icp import IcpConfig, open_icp
 
     return MethodKind(open_icp, "needed", False, IcpConfig().model_dump(mode="json"))
 
 
 def _colored_icp() -> MethodKind:
-    from eval.peers.colored_icp import ColoredIcpConfig, open_colored_icp
+    with system_libraries_of("open3d"):
+        from eval.peers.colored_icp import ColoredIcpConfig, open_colored_icp
 
     return MethodKind(open_colored_icp, "needed", False, ColoredIcpConfig().model_dump(mode="json"))
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from tracker.errors import MissingExtraError, SourceError
 from tracker.sources.realsense.request import Options
+from tracker.system_libraries import system_libraries_of
 
 USUAL_SIZE, USUAL_FPS = (640, 480), 30
 # by preference: what needs no conversion first; the SDK's name -> `raw_frame.COLOUR_ORDERS`
@@ -19,9 +20,10 @@ Profile = Any  # the SDK is not there when types are checked
 
 
 def load_sdk() -> Any:
-    """The module pyrealsense2. Raises MissingExtraError that names the extra."""
+    """The module pyrealsense2. Raises MissingExtraError that names the extra, MissingLibraryError without libusb."""
     try:
-        return importlib.import_module("pyrealsense2")
+        with system_libraries_of("pyrealsense2"):
+            return importlib.import_module("pyrealsense2")
     except ImportError as error:
         raise MissingExtraError(
             f"a RealSense camera or recording needs pyrealsense2 ({error}): pip install 'conceptrack[realsense]'"

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tracker.geometry import Pose
 from tracker.sources.synthetic.things.mesh import Mesh
+from tracker.system_libraries import system_libraries_of
 
 Float32s = npt.NDArray[np.floating]  # float32 in fact: rays are many; numpy's type stubs lose that
 NOTHING = -1
@@ -35,7 +36,8 @@ class Group:
     """Meshes that do not move against each other, in their common frame."""
 
     def __init__(self, meshes: Sequence[tuple[int, Mesh]], atlas_size_px: tuple[int, int]) -> None:
-        import open3d as o3d
+        with system_libraries_of("open3d"):
+            import open3d as o3d
 
         offsets = np.cumsum([0, *(len(mesh.vertices_m) for _, mesh in meshes)])
         faces = np.concatenate([m.faces + offset for (_, m), offset in zip(meshes, offsets, strict=False)])

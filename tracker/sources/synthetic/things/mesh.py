@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.distance import pdist
 
 from tracker.geometry import Floats, Pose
+from tracker.system_libraries import system_libraries_of
 
 Ints = npt.NDArray[np.int64]
 
@@ -103,7 +104,8 @@ def surface_samples(mesh: Mesh, count: int) -> Floats:
 
 def _buried(mesh: Mesh, points_m: Floats, own_body: Ints) -> npt.NDArray[np.bool_]:
     """(N,) whether a point of one body lies inside another one."""
-    import open3d as o3d
+    with system_libraries_of("open3d"):
+        import open3d as o3d
 
     buried = np.zeros(len(points_m), bool)
     for body in range(int(mesh.body.max()) + 1):
