@@ -200,7 +200,8 @@ class Looking:
 
     def _found(self, hypothesis: Hypothesis, look: Look) -> Found:
         grounds = self._grounds(hypothesis, look.expected)
-        found = Found(hypothesis, grounds, confidence(grounds), self._expects(look, hypothesis), look.masked)
+        likely = confidence(grounds) if hypothesis.evidence.surface >= LEAST_SURFACE else 0.0
+        found = Found(hypothesis, grounds, likely, self._expects(look, hypothesis), look.masked)
         self.tried.append(found)
         return found
 
