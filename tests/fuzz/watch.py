@@ -1,0 +1,86 @@
+"""The attempts in a process of their own, so that one that crashes, hangs or asks for too much memory is found too."""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tests.fuzz.attempt import Attempts, Finding
+
+MOST_MEMORY = 1 << 30  # bytes of address space beyond those before the first input: some pictures of the largest size
+STALLED_S = 60.0
+
+
+@dataclass(slots=True)
+class Outcome:
+    """Of the inputs of one reader: how many there were, and how many it refused as it should."""
+
+    reader: str
+    tried: int = 0
+    refused: int = 0
+    findings: list[Finding] = field(default_factory=list)
+
+
+def watched(name: str, seed: int, first: int, inputs: int) -> Outcome:
+    """Inputs `first` to `first + inputs` of a reader."""
+    outcome, number = Outcome(name), first - 1
+    while number < first + inputs - 1:
+        for told in _told(name, seed, number + 1, first + inputs - number - 1):
+            if isinstance(told, int):
+                number = told
+            elif isinstance(told, Finding):
+                outcome.findings.append(told)
+            elif isinstance(told, str) and number < first:
+                raise RuntimeError(f"{name}: {told} before the first input: its sample is refused")
+            elif isinstance(told, str):
+                outcome.findings.append(Finding(name, number, told))
+            else:
+                outcome.refused += told[0]
+        outcome.tried = number + 1 - first
+    return outcome
+
+
+def _told(name: str, seed: int, first: int, inputs: int) -> Iterator[int | Finding | str | tuple[int]]:
+    """The number of each input as it begins, what was found, and in the end how many were refused or, as text, how the
+    process ended before that."""
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_work, args=(there, name, seed, first, inputs), daemon=True)
+    process.start()
+    there.close()
+    try:
+        while here.poll(STALLED_S):
+            told = here.recv()
+            yield told
+            if isinstance(told, tuple):
+                return
+        yield f"no end after {STALLED_S:g} s"
+    except EOFError:
+        process.join()
+        yield f"the process ended with exit code {process.exitcode}"
+    finally:
+        process.kill()
+        process.join()
+
+
+def _work(there: Connection, name: str, seed: int, first: int, inputs: int) -> None:
+    with TemporaryDirectory() as folder:
+        attempts = Attempts(name, seed, Path(folder))
+        most = _address_space() + MOST_MEMORY
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+        for number in range(first, first + inputs):
+            there.send(number)
+            finding = attempts(number)
+            if finding:
+                there.send(finding)
+        there.send((attempts.refused,))
+
+
+def _address_space() -> int:
+    """Bytes, of this process."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
