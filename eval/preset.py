@@ -7,7 +7,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from tracker.errors import ConfigError
@@ -138,11 +137,7 @@ def read_preset(name_or_path: str) -> Preset:
     """A shipped preset by its name, or one from a file. Raises ConfigError that names the file and the key in it."""
     path = preset_path(name_or_path)
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{path}: cannot be read as YAML ({error})") from error
-    try:
-        return Preset.model_validate(content)
+        return Preset.model_validate(read_yaml(path))
     except ValidationError as error:
         raise ConfigError("; ".join(f"{path}: {_complaint(each)}" for each in error.errors())) from error
 

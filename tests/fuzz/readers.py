@@ -34,15 +34,13 @@ from tracker.sources.image_files import read_depth_m, read_labels, read_mask, re
 @dataclass(frozen=True, slots=True)
 class Reader:
     """sample: fills a folder. files: patterns of those in it of which one is damaged at a time. read: of the folder and
-    the damaged file. refusal: what it may raise. named: what a complaint may name, in the sample's folder, in the place of
-    the damaged file."""
+    the damaged file. refusal: what it may raise."""
 
     sample: Callable[[Path], None]
     files: tuple[str, ...]
     damage: Damage
     read: Callable[[Path, Path], object]
     refusal: type[Exception] = TrackerError
-    named: tuple[str, ...] = ()
 
 
 def _dataset(kind: str, folder: Path, file: Path) -> None:  # noqa: ARG001

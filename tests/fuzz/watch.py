@@ -12,7 +12,8 @@ from tempfile import TemporaryDirectory
 
 from tests.fuzz.attempt import Attempts, Finding
 
-MOST_MEMORY = 1 << 30  # bytes of address space beyond those before the first input: some pictures of the largest size
+MOST_MEMORY = 1 << 30  # bytes beyond those before the first input: some pictures of the largest size
+MOST_ADDRESSES = 8 * MOST_MEMORY  # of which not everything has memory behind it; guards the machine
 STALLED_S = 60.0
 
 
@@ -71,16 +72,22 @@ def _told(name: str, seed: int, first: int, inputs: int) -> Iterator[int | Findi
 def _work(there: Connection, name: str, seed: int, first: int, inputs: int) -> None:
     with TemporaryDirectory() as folder:
         attempts = Attempts(name, seed, Path(folder))
-        most = _address_space() + MOST_MEMORY
+        most = _bytes_of("VmSize") + MOST_ADDRESSES
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
+        before = _bytes_of("VmHWM")
         for number in range(first, first + inputs):
             there.send(number)
             finding = attempts(number)
             if finding:
                 there.send(finding)
+            grown = _bytes_of("VmHWM") - before
+            if grown > MOST_MEMORY:
+                there.send(Finding(name, number, f"needs {grown >> 20} MiB of memory"))
+                before += grown
         there.send((attempts.refused,))
 
 
-def _address_space() -> int:
-    """Bytes, of this process."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+def _bytes_of(kind: str) -> int:
+    """Bytes of this process: VmSize of addresses, VmHWM the most that it had of memory so far."""
+    status = Path("/proc/self/status").read_text()
+    return int(status.partition(f"{kind}:")[2].split()[0]) << 10
