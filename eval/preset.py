@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from tracker.errors import ConfigError
+from tracker.yaml_files import read_yaml
 
 SHIPPED = Path(__file__).with_name("presets")
 

@@ -13,6 +13,7 @@ import yaml
 
 from tracker.errors import ConfigError
 from tracker.whole_file import write_whole
+from tracker.yaml_files import read_yaml
 
 SHIPPED = Path(__file__).with_name("vocabularies")
 LONGEST_LABEL = 64

@@ -7,8 +7,6 @@ import sqlite3
 import struct
 import zlib
 from io import BytesIO
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -101,22 +99,19 @@ def changed_sqlite(data: bytes, rng: Rng) -> bytes:
     """A database of ROS 2 that is whole, of which a message or a topic is not."""
     if rng.random() < 0.5:
         return damaged(data, rng)
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "a.db3"
-        path.write_bytes(data)
-        connection = sqlite3.connect(path)
-        rows = connection.execute("SELECT id, data FROM messages").fetchall()
-        number, message = rows[rng.integers(len(rows))]
-        what = rng.random()
-        if what < 0.7:
-            connection.execute("UPDATE messages SET data = ? WHERE id = ?", (damaged(message, rng), number))
-        elif what < 0.85:
-            column = ("name", "type", "serialization_format", "offered_qos_profiles")[rng.integers(4)]
-            order = f"UPDATE topics SET {column} = ? WHERE id = ?"  # noqa: S608 - of the four names above
-            connection.execute(order, (("x", "", None, "sensor_msgs/msg/Image", 5)[rng.integers(5)], 1))
-        else:
-            value = (None, "x", -1, 2**62, 1.5, b"\0")[rng.integers(6)]
-            connection.execute("UPDATE messages SET timestamp = ? WHERE id = ?", (value, number))
-        connection.commit()
-        connection.close()
-        return path.read_bytes()
+    connection = sqlite3.connect(":memory:")
+    connection.deserialize(data)
+    rows = connection.execute("SELECT id, data FROM messages").fetchall()
+    number, message = rows[rng.integers(len(rows))]
+    what = rng.random()
+    if what < 0.7:
+        connection.execute("UPDATE messages SET data = ? WHERE id = ?", (damaged(message, rng), number))
+    elif what < 0.85:
+        column = ("name", "type", "serialization_format", "offered_qos_profiles")[rng.integers(4)]
+        value = ("x", "", "sensor_msgs/msg/Image", 5, b"\xff")[rng.integers(5)]
+        connection.execute(f"UPDATE topics SET {column} = ? WHERE id = 1", (value,))  # noqa: S608 - one of four names
+    else:
+        value = ("x", -1, 2**62, 1.5, b"\0")[rng.integers(5)]
+        connection.execute("UPDATE messages SET timestamp = ? WHERE id = ?", (value, number))
+    connection.commit()
+    return connection.serialize()

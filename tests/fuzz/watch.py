@@ -40,15 +40,15 @@ def watched(name: str, seed: int, first: int, inputs: int) -> Outcome:
                 raise RuntimeError(f"{name}: {told} before the first input: its sample is refused")
             elif isinstance(told, str):
                 outcome.findings.append(Finding(name, number, told))
-            else:
+            elif told:
                 outcome.refused += told[0]
         outcome.tried = number + 1 - first
     return outcome
 
 
-def _told(name: str, seed: int, first: int, inputs: int) -> Iterator[int | Finding | str | tuple[int]]:
-    """The number of each input as it begins, what was found, and in the end how many were refused or, as text, how the
-    process ended before that."""
+def _told(name: str, seed: int, first: int, inputs: int) -> Iterator[int | Finding | str | tuple[int] | None]:
+    """The number of each input as it begins, what was found, how many were refused since that was told last, and in the
+    end None or, as text, how the process ended before that."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(there, name, seed, first, inputs), daemon=True)
@@ -58,7 +58,7 @@ def _told(name: str, seed: int, first: int, inputs: int) -> Iterator[int | Findi
         while here.poll(STALLED_S):
             told = here.recv()
             yield told
-            if isinstance(told, tuple):
+            if told is None:
                 return
         yield f"no end after {STALLED_S:g} s"
     except EOFError:
@@ -77,14 +77,16 @@ def _work(there: Connection, name: str, seed: int, first: int, inputs: int) -> N
         before = _bytes_of("VmHWM")
         for number in range(first, first + inputs):
             there.send(number)
-            finding = attempts(number)
+            refused, finding = attempts.refused, attempts(number)
             if finding:
                 there.send(finding)
+            if attempts.refused > refused:
+                there.send((attempts.refused - refused,))
             grown = _bytes_of("VmHWM") - before
             if grown > MOST_MEMORY:
                 there.send(Finding(name, number, f"needs {grown >> 20} MiB of memory"))
                 before += grown
-        there.send((attempts.refused,))
+        there.send(None)
 
 
 def _bytes_of(kind: str) -> int:
