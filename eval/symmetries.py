@@ -70,7 +70,9 @@ class ObjectSymmetries:
         if not np.isfinite(matrices).all() or not np.isfinite(points_m).all() or not (lengths > 0).all():
             raise ValueError(f"a symmetry is finite and its axis a direction; got {directions.tolist()}")
         if max(len(matrices), len(directions)) > MOST_LISTED:
-            raise ValueError(f"got {len(matrices)} motions and {len(directions)} axes, no object has over {MOST_LISTED}")
+            raise ValueError(
+                f"got {len(matrices)} motions and {len(directions)} axes, no object has over {MOST_LISTED}"
+            )
         if len(points_m) != len(directions):
             raise ValueError(f"every axis has a point on it; got {len(directions)} axes and {len(points_m)} points")
         return cls(Motions(turns, matrices[:, :3, 3]), directions / lengths, points_m)

@@ -1,7 +1,4 @@
-"""python -m tests.fuzz [readers ...] [--inputs 10000] [--seed 0]
-
-With --keep FOLDER the damaged files that were found are written there.
-"""
+"""Damaged files through the readers, and faulty frames through the tracker; what should not come out is printed."""
 
 from __future__ import annotations
 
@@ -13,23 +10,26 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tests.fuzz.attempt import Attempts, Finding
+from tests.fuzz.faulty_frames import NAME
 from tests.fuzz.readers import READERS
 from tests.fuzz.watch import watched
+
+NAMES = (*READERS, NAME)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
-    parser.add_argument("readers", nargs="*", metavar="READER", help=f"all, or some of {', '.join(READERS)}")
-    parser.add_argument("--inputs", type=int, default=10_000, help="for each reader")
+    parser.add_argument("readers", nargs="*", metavar="NAME", help=f"all, or some of {', '.join(NAMES)}")
+    parser.add_argument("--inputs", type=int, default=10_000, help="for each")
     parser.add_argument("--first", type=int, default=0, help="number of the first input")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="folder for the damaged files that were found")
     asked = parser.parse_args()
-    if unknown := set(asked.readers) - READERS.keys():
-        parser.error(f"no reader is called {', '.join(sorted(unknown))}; there are {', '.join(READERS)}")
+    if unknown := set(asked.readers) - set(NAMES):
+        parser.error(f"no reader is called {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
     logging.disable()
     found = 0
-    for name in asked.readers or READERS:
+    for name in asked.readers or NAMES:
         began = time.monotonic()
         outcome = watched(name, asked.seed, asked.first, asked.inputs)
         seconds = time.monotonic() - began
@@ -41,7 +41,7 @@ def main() -> None:
         found += len(outcome.findings)
         for finding in _one_of_a_kind(outcome.findings):
             print(f"  {finding.number}: {finding.what}\n{finding.trace}", flush=True)
-            if asked.keep:
+            if asked.keep and name in READERS:
                 _keep(asked.keep, finding, asked.seed)
     sys.exit(1 if found else 0)
 

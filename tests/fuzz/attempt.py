@@ -55,9 +55,9 @@ class Attempts:
             except self._reader.refusal as error:
                 self.refused += 1
                 if not self._names(str(error), file):
-                    return Finding(self._name, number, f"does not name {file.name}: {error!s:.400}", _where(error))
+                    return Finding(self._name, number, f"does not name {file.name}: {error!s:.400}", where_from(error))
             except Exception as error:  # whatever it is, it is what is looked for
-                return Finding(self._name, number, f"{error!r:.400} from {file.name}", _where(error))
+                return Finding(self._name, number, f"{error!r:.400} from {file.name}", where_from(error))
         return None
 
     def _names(self, text: str, file: Path) -> bool:
@@ -74,5 +74,5 @@ def _replaced(file: Path, content: bytes, whole: bytes) -> Iterator[None]:
         file.write_bytes(whole)
 
 
-def _where(error: Exception) -> str:
+def where_from(error: Exception) -> str:
     return "".join(traceback.format_exception(error)[-12:])

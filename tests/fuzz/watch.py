@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import multiprocessing
 import resource
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tests.fuzz.attempt import Attempts, Finding
+from tests.fuzz.faulty_frames import NAME, FaultyFrames, Scenes
 
 MOST_MEMORY = 1 << 30  # bytes beyond those before the first input: some pictures of the largest size
 MOST_ADDRESSES = 8 * MOST_MEMORY  # of which not everything has memory behind it; guards the machine
 STALLED_S = 60.0
+Work = Callable[[Connection, str, int, int, int], None]
 
 
 @dataclass(slots=True)
@@ -27,11 +29,16 @@ class Outcome:
     findings: list[Finding] = field(default_factory=list)
 
 
-def watched(name: str, seed: int, first: int, inputs: int) -> Outcome:
-    """Inputs `first` to `first + inputs` of a reader."""
+def watched(
+    name: str, seed: int, first: int, inputs: int, work: Work | None = None, stalled_s: float = STALLED_S
+) -> Outcome:
+    """Inputs `first` to `first + inputs` of a reader, or frames of the tracker.
+
+    work: what is done in the process. stalled_s: after so long without an input that ends it is given up.
+    """
     outcome, number = Outcome(name), first - 1
     while number < first + inputs - 1:
-        for told in _told(name, seed, number + 1, first + inputs - number - 1):
+        for told in _told(work or _work, (name, seed, number + 1, first + inputs - number - 1), stalled_s):
             if isinstance(told, int):
                 number = told
             elif isinstance(told, Finding):
@@ -46,21 +53,23 @@ def watched(name: str, seed: int, first: int, inputs: int) -> Outcome:
     return outcome
 
 
-def _told(name: str, seed: int, first: int, inputs: int) -> Iterator[int | Finding | str | tuple[int] | None]:
+def _told(
+    work: Work, asked: tuple[str, int, int, int], stalled_s: float
+) -> Iterator[int | Finding | str | tuple[int] | None]:
     """The number of each input as it begins, what was found, how many were refused since that was told last, and in the
     end None or, as text, how the process ended before that."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(there, name, seed, first, inputs), daemon=True)
+    process = context.Process(target=work, args=(there, *asked), daemon=True)
     process.start()
     there.close()
     try:
-        while here.poll(STALLED_S):
+        while here.poll(stalled_s):
             told = here.recv()
             yield told
             if told is None:
                 return
-        yield f"no end after {STALLED_S:g} s"
+        yield f"no end after {stalled_s:g} s"
     except EOFError:
         process.join()
         yield f"the process ended with exit code {process.exitcode}"
@@ -71,7 +80,7 @@ def _told(name: str, seed: int, first: int, inputs: int) -> Iterator[int | Findi
 
 def _work(there: Connection, name: str, seed: int, first: int, inputs: int) -> None:
     with TemporaryDirectory() as folder:
-        attempts = Attempts(name, seed, Path(folder))
+        attempts = FaultyFrames(seed, Scenes()) if name == NAME else Attempts(name, seed, Path(folder))
         most = _bytes_of("VmSize") + MOST_ADDRESSES
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
         before = _bytes_of("VmHWM")

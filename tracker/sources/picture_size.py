@@ -10,13 +10,21 @@ START_OF_SCAN = 0xDA
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
-    """(width, height); None where the data are no PNG and no JPEG, or end before that is told."""
+    """(width, height); None where the data are no PNG and no JPEG, are damaged, or end before that is told."""
     try:
         if data.startswith(PNG_START):
-            return struct.unpack_from(">II", data, 16) if data[12:16] == b"IHDR" else None
+            return _png_size(data)
         return _jpeg_size(data) if data.startswith(JPEG_START) else None
     except struct.error:
         return None
+
+
+def _png_size(data: bytes) -> tuple[int, int] | None:
+    """Where every chunk fits into the data: a decoder makes room for what a chunk claims to hold."""
+    at = len(PNG_START)
+    while at < len(data) and data[at + 4 : at + 8] != b"IEND":
+        at += 12 + struct.unpack_from(">I", data, at)[0]
+    return struct.unpack_from(">II", data, 16) if at < len(data) and data[12:16] == b"IHDR" else None
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int] | None:
