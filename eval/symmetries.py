@@ -71,7 +71,7 @@ class ObjectSymmetries:
             raise ValueError(f"a symmetry is finite and its axis a direction; got {directions.tolist()}")
         if max(len(matrices), len(directions)) > MOST_LISTED:
             raise ValueError(
-                f"got {len(matrices)} motions and {len(directions)} axes, no object has over {MOST_LISTED}"
+                f"at most {MOST_LISTED} motions and axes are read, got {len(matrices)} and {len(directions)}"
             )
         if len(points_m) != len(directions):
             raise ValueError(f"every axis has a point on it; got {len(directions)} axes and {len(points_m)} points")

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from reference.vocabulary import (
     HEADER,
-    LARGEST_FILE,
     LONGEST_LABEL,
     SHIPPED,
     Vocabulary,
@@ -24,6 +23,7 @@ from reference.vocabulary import (
     write_vocabulary,
 )
 from tracker.errors import ConfigError, OutputError
+from tracker.yaml_files import LARGEST_FILE
 from tracker.saliency.vision_language import GENERAL_LABELS
 
 MUG = Vocabulary("mug", ("handle", "rim"), ids=("14", "025_mug"))

@@ -178,9 +178,7 @@ def _check_header(path: Path, header: Any) -> None:
     if not 0 < header["diameter_m"] < FARTHEST_M:
         raise ModelError(f"{path}: the header's diameter_m is {header['diameter_m']}, expected a length in metres")
     if not header["labels"] or not all(isinstance(label, str) for label in header["labels"]):
-        raise ModelError(
-            f"{path}: the header's labels are {reprlib.repr(header['labels'])}, expected one or more texts"
-        )
+        raise ModelError(f"{path}: the header's labels are {reprlib.repr(header['labels'])}, expected texts")
 
 
 def _check_arrays(path: Path, arrays: dict[str, np.ndarray], concepts: int) -> None:

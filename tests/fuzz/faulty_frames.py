@@ -10,7 +10,6 @@ import numpy as np
 
 from reference.onboard import onboard
 from tests.fuzz.attempt import Finding, where_from
-from tests.fuzz.damage import Rng
 from tests.fuzz.frames import FAULTS, parts_of
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
@@ -106,7 +105,7 @@ class FaultyFrames:
         wrong = complaint(result, frame, self._state, shown) or ("a late frame was taken" if late else None)
         self._state, self._last_ns = result.state, frame.stamp_ns
         self.tracked += result.pose is not None
-        return wrong and Finding(NAME, number, f"{wrong} ({what})")
+        return Finding(NAME, number, f"{wrong} ({what})") if wrong else None
 
 
 def complaint(result: TrackResult, frame: Frame, before: TrackState, shown: bool) -> str | None:

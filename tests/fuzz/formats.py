@@ -77,8 +77,10 @@ def changed_mat(data: bytes, rng: Rng) -> bytes:
     value = fields[name]
     others: tuple[Any, ...] = (
         None, "text", np.array([]), np.zeros((0, 3)), value.astype(complex), value.astype(str), value.astype(object),
-        value.ravel(), value[..., None, None], np.full_like(value, 255), value.astype(float) * np.nan, -value.astype(float),
-        value.astype(float) * 1e300, np.array(EXTREMES[rng.integers(len(EXTREMES))], np.uint64), {"a": value}, value.T, [value, "x"],
+        value.ravel(), value[..., None, None], np.full_like(value, 255), value.astype(float) * np.nan,
+        -value.astype(float),
+        value.astype(float) * 1e300, np.array(EXTREMES[rng.integers(len(EXTREMES))], np.uint64), {"a": value},
+        value.T, [value, "x"],
         value.astype(bool), np.tile(value, 3),
     )  # fmt: skip
     fields[name] = others[rng.integers(len(others))]

@@ -73,6 +73,12 @@ def _opened(name: str, folder: Path, file: Path) -> None:  # noqa: ARG001
     _source(open_source(name.format(folder)))
 
 
+def _model(folder: Path, file: Path) -> None:  # noqa: ARG001
+    model = ConceptModel.load(file)
+    for label in model.labels:
+        model.locate(label)
+
+
 def _picture(folder: Path, file: Path) -> None:  # noqa: ARG001
     {"depth": partial(read_depth_m, metres_per_unit=0.001), "colour": read_rgb, "labels": read_labels}[file.stem](file)
     read_mask(file)
@@ -117,9 +123,7 @@ READERS: dict[str, Reader] = {
     "folder": Reader(
         samples.pictures_in_a_folder, ("*.txt", "annotated_poses/*.txt"), reworded, partial(_opened, "folder:{}")
     ),
-    "concept-model": Reader(
-        samples.concept_model, ("*.concept",), changed_model, lambda _, file: ConceptModel.load(file).locate("red")
-    ),
+    "concept-model": Reader(samples.concept_model, ("*.concept",), changed_model, _model),
     "config": Reader(samples.settings, ("config.yaml",), changed_yaml, lambda _, file: read_config(file)),
     "preset": Reader(samples.settings, ("preset.yaml",), changed_yaml, lambda _, file: read_preset(str(file))),
     "vocabulary": Reader(

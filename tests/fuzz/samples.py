@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,17 +40,15 @@ def bop(folder: Path) -> None:
     (folder / "models" / "obj_000004.ply").write_bytes(bytes(mesh.export(file_type="ply", encoding="ascii")))
     mesh.export(folder / "models" / "obj_000007.ply")
     turn = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
-    symmetries = (
-        '"symmetries_discrete": [%s], "symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]' % turn
-    )
+    turns = {"symmetries_discrete": [turn], "symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]}
     write_text(
-        folder / "models" / "models_info.json", '{"4": {"diameter": 74.8}, "7": {"diameter": 74.8, %s}}' % symmetries
+        folder / "models" / "models_info.json", json.dumps({"4": {"diameter": 74.8}, "7": {"diameter": 74.8, **turns}})
     )
-    targets = ", ".join(
-        f'{{"im_id": {image}, "inst_count": 1, "obj_id": {number}, "scene_id": 3}}'
-        for image, number in ((2, 4), (5, 7), (10, 4))
-    )
-    write_text(folder / "test_targets_bop19.json", f"[{targets}]")
+    targets = [
+        {"im_id": image_id, "inst_count": 1, "obj_id": number, "scene_id": 3}
+        for image_id, number in ((2, 4), (5, 7), (10, 4))
+    ]
+    write_text(folder / "test_targets_bop19.json", json.dumps(targets))
 
 
 def results(folder: Path) -> None:

@@ -8,11 +8,16 @@ from tests.fuzz.damage import Rng, damaged
 
 BETWEEN_WORDS = re.compile(r"([\s,;:/\[\]{}\"]+)")
 WORDS = (
-    "", "0", "-1", "1", "7", "1.5", "-0.0", "nan", "inf", "-inf", "NaN", "Infinity", "1e309", "-1e308", "1e-320", "1e99",
-    "2147483648", "-9223372036854775809", "9" * 30, "9" * 400, "1" * 5000, "1e999999999", "1e-999999999", "0x10", "1_000",
-    "٣", "²", "½", "１２", "\0", "\u2028", "\ufeff", "é" * 300, "x" * 10_000, "'", '"', "#", "%s", "{}", "-", "--", ",", ",,,,",
-    "..", "/", "../../../etc/passwd", "/etc/passwd", "/dev/zero", "/proc/self/mem", "~", "C:\\x", "file:///etc/passwd", "$HOME",
-    "rgb", "depth", "../rgb", "null", "true", "None", "yes", "!!python/object/apply:os.system ['false']", "&a", "*a", "<<", "---",
+    "", "0", "-1", "1", "7", "1.5", "-0.0", "nan", "inf", "-inf", "NaN", "Infinity", "1e309", "-1e308", "1e-320",
+    "1e99",
+    "2147483648", "-9223372036854775809", "9" * 30, "9" * 400, "1" * 5000, "1e999999999", "1e-999999999", "0x10",
+    "1_000",
+    "٣", "²", "½", "１２", "\0", "\u2028", "\ufeff", "é" * 300, "x" * 10_000, "'", '"', "#", "%s", "{}", "-", "--",
+    ",", ",,,,",
+    "..", "/", "../../../etc/passwd", "/etc/passwd", "/dev/zero", "/proc/self/mem", "~", "C:\\x",
+    "file:///etc/passwd", "$HOME",
+    "rgb", "depth", "../rgb", "null", "true", "None", "yes", "!!python/object/apply:os.system ['false']", "&a", "*a",
+    "<<", "---",
     "2001-99-99", "0o8", "1:60:60", "=", "? a", "| ", "!!binary", "!!set", "!!int x", "!!float x", "!!timestamp x",
 )  # fmt: skip
 

@@ -9,7 +9,7 @@ import numpy as np
 from tracker.errors import FrameError, SourceError
 from tracker.geometry import Floats, Pose
 
-LONGEST_NUMBER = 9  # digits of a scene, an image or an object
+LONGEST_NUMBER = 18  # digits of a scene, an image or an object: none is larger than 64 bits hold
 LONGEST_NAME = 200  # bytes; a file's has at most 255, with what comes after it
 
 

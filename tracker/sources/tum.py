@@ -107,8 +107,9 @@ class TumFolder:
                 [(_nanoseconds(file, row[0]), path_within(self._path, row[1], str(file))) for row in _rows(file, 2)]
                 for file in lists
             )
-            stamps_ns = [[stamp_ns for stamp_ns, _ in each] for each in (colours, depths)]
-            pictures = [_Pictures(*colours[a], *depths[b]) for a, b in pair_stamps(*stamps_ns, slop_ns)]
+            colour_ns, depth_ns = ([stamp_ns for stamp_ns, _ in each] for each in (colours, depths))
+            paired = pair_stamps(colour_ns, depth_ns, slop_ns)
+            pictures = [_Pictures(*colours[a], *depths[b]) for a, b in paired]
             where, counted = f"{self._path}/rgb.txt and depth.txt ({len(colours)} and {len(depths)} pictures)", False
         if not pictures:
             raise SourceError(f"{where}: no pictures belong together (within {slop_ns / 1e9:g} s); say ?slop=SECONDS")
