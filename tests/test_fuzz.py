@@ -1,4 +1,4 @@
-"""Damaged files through every reader, and faulty frames through the tracker: a few of those of `python -m tests.fuzz`."""
+"""Damaged files through the readers, faulty frames through the tracker: a few of those of `python -m tests.fuzz`."""
 
 from __future__ import annotations
 

@@ -23,8 +23,8 @@ from reference.vocabulary import (
     write_vocabulary,
 )
 from tracker.errors import ConfigError, OutputError
-from tracker.yaml_files import LARGEST_FILE
 from tracker.saliency.vision_language import GENERAL_LABELS
+from tracker.yaml_files import LARGEST_FILE
 
 MUG = Vocabulary("mug", ("handle", "rim"), ids=("14", "025_mug"))
 BOWL = Vocabulary("bowl", ("rim", "foot"), ids=("13", "024_bowl"))

@@ -127,7 +127,7 @@ READERS: dict[str, Reader] = {
     "config": Reader(samples.settings, ("config.yaml",), changed_yaml, lambda _, file: read_config(file)),
     "preset": Reader(samples.settings, ("preset.yaml",), changed_yaml, lambda _, file: read_preset(str(file))),
     "vocabulary": Reader(
-        samples.vocabulary, ("*.yaml",), changed_yaml, lambda _, file: read_vocabulary(str(file)).for_object("mug")
+        samples.vocabulary, ("*.yaml",), changed_yaml, lambda _, file: read_vocabulary(str(file)).vocabularies
     ),
     "language-model": Reader(
         samples.answer, ("*",), reworded, lambda _, file: labels_in(file.read_text(errors="replace"), 4), ValueError
