@@ -17,7 +17,7 @@ from tests.fuzz.watch import watched
 from tests.fuzz.words import reworded
 from tracker.errors import SourceError
 
-INPUTS, FRAMES = 100, 250
+INPUTS, FRAMES = 100, 125
 
 
 @pytest.mark.parametrize("name", READERS)
@@ -78,9 +78,9 @@ def crash_then_stall(there: Connection, name: str, seed: int, first: int, inputs
 
 
 def test_a_process_that_crashes_or_stalls_is_found_and_the_inputs_go_on() -> None:
-    outcome = watched("run", 0, 0, 4, work=crash_then_stall, stalled_s=30)
+    outcome = watched("run", 0, 0, 4, work=crash_then_stall, stalled_s=2)
     assert outcome.tried == 4
     assert [(finding.number, finding.what[:20]) for finding in outcome.findings] == [
         (1, "the process ended wi"),
-        (2, "no end after 30 s"),
+        (2, "no end after 2 s"),
     ]

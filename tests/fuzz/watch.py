@@ -15,7 +15,7 @@ from tests.fuzz.faulty_frames import NAME, FaultyFrames, Scenes
 
 MOST_MEMORY = 1 << 30  # bytes beyond those before the first input: some pictures of the largest size
 MOST_ADDRESSES = 8 * MOST_MEMORY  # of which not everything has memory behind it; guards the machine
-STALLED_S = 60.0
+STALLED_S, STARTED_S = 60.0, 300.0
 Work = Callable[[Connection, str, int, int, int], None]
 
 
@@ -64,12 +64,13 @@ def _told(
     process.start()
     there.close()
     try:
-        while here.poll(stalled_s):
-            told = here.recv()
+        patience_s = STARTED_S
+        while here.poll(patience_s):
+            told, patience_s = here.recv(), stalled_s
             yield told
             if told is None:
                 return
-        yield f"no end after {stalled_s:g} s"
+        yield f"no end after {patience_s:g} s"
     except EOFError:
         process.join()
         yield f"the process ended with exit code {process.exitcode}"
