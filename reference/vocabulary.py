@@ -135,7 +135,11 @@ def read_vocabulary(name_or_path: str) -> VocabularySet:
     """
     shipped = shipped_vocabularies()
     path = SHIPPED / f"{name_or_path}.yaml" if name_or_path in shipped else Path(name_or_path)
-    if not path.is_file():
+    try:
+        found = path.is_file()
+    except OSError as error:  # a name that no file can have
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
+    if not found:
         raise ConfigError(f"there is no vocabulary {name_or_path!r}; expected a file, or one of {', '.join(shipped)}")
     content = read_yaml(path)
     entries = _mapping(content, KEYS, f"{path}: the file").get("vocabularies")

@@ -137,8 +137,9 @@ def test_the_device_is_found_or_named() -> None:
 
 
 @pytest.mark.parametrize(
-    "content", ["a: 2001-99-99", "a: !!bool x", "a: !!timestamp x", "[" * 5000, "a: " + "1" * 5000, "? [a]\n: {}: 5", "#" * 2_000_000]
-)  # fmt: skip
+    "content",
+    ["a: 2001-99-99", "a: !!bool x", "a: !!timestamp x", "[" * 5000, "a: " + "1" * 5000, "? {a}", "#" * 2_000_000],
+)
 def test_yaml_that_the_parser_stumbles_over_is_named(content: str, tmp_path: Path) -> None:
     (tmp_path / "settings.yaml").write_text(content)
     with pytest.raises(ConfigError, match=r"settings\.yaml: (cannot be read as YAML|larger than such a file can be)"):
@@ -151,4 +152,4 @@ def test_a_few_lines_that_stand_for_billions_make_a_short_complaint(tmp_path: Pa
     (tmp_path / "settings.yaml").write_text("\n".join((*rows, "seed: [*a9]")))
     with pytest.raises(ConfigError, match="seed") as caught:
         read_config(tmp_path / "settings.yaml")
-    assert len(str(caught.value)) < 20_000
+    assert len(str(caught.value)) < 2000

@@ -60,6 +60,8 @@ def test_a_chunk_that_claims_more_than_the_file_has_is_refused(tmp_path: Path) -
     (tmp_path / "a.png").write_bytes(png(6, 5, length=1 << 30))
     with pytest.raises(SourceError, match=r"a\.png: not a PNG or JPEG that can be decoded"):
         read_rgb(tmp_path / "a.png")
+    assert picture_size(png(6, 5)[:-12] + chunk(b"IEND", b"", 1 << 30)) is None
+    assert picture_size(png(6, 5) + b"what follows is nobody's") == (6, 5)
 
 
 def test_other_kinds_of_pictures_are_refused_as_their_size_is_not_known(tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def _complaint(error: Any) -> str:
     if error["type"] == "extra_forbidden":
         known = _settings_at([str(part) for part in error["loc"][:-1]])
         return f"there is no setting {name!r}; there are {', '.join(known)}"
-    return f"{name}: {error['msg']} (got {reprlib.repr(error['input'])})"
+    return f"{name}: {error['msg']} (got {reprlib.repr(error['input']):.200})"
 
 
 def _settings_at(path: list[str]) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from pydantic import ConfigDict, TypeAdapter
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from tracker.concept import ConceptModel, told_apart
 from tracker.config import TrackerConfig, read_config
@@ -50,9 +50,11 @@ class SavedRun:
         """Raises OutputError where there is none, or it is damaged."""
         try:
             return _RUN.validate_json((folder / FILE).read_bytes())
-        except (OSError, ValueError) as error:
+        except (OSError, ValidationError) as error:
+            first = {} if isinstance(error, OSError) else error.errors()[0]
+            why = f"{'.'.join(map(str, first['loc']))}: {first['msg']}" if first else str(error)
             raise OutputError(
-                f"{folder / FILE} cannot be used ({error!s:.500}); expected a folder that python -m tracker --out wrote"
+                f"{folder / FILE} cannot be used ({why}); expected a folder that python -m tracker --out wrote"
             ) from error
 
 

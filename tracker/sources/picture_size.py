@@ -21,10 +21,11 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 
 def _png_size(data: bytes) -> tuple[int, int] | None:
     """Where every chunk fits into the data: a decoder makes room for what a chunk claims to hold."""
-    at = len(PNG_START)
-    while at < len(data) and data[at + 4 : at + 8] != b"IEND":
+    at, kind = len(PNG_START), b""
+    while kind != b"IEND":
+        kind = data[at + 4 : at + 8]
         at += 12 + struct.unpack_from(">I", data, at)[0]
-    return struct.unpack_from(">II", data, 16) if at < len(data) and data[12:16] == b"IHDR" else None
+    return struct.unpack_from(">II", data, 16) if at <= len(data) and data[12:16] == b"IHDR" else None
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int] | None:
