@@ -58,7 +58,7 @@ def test_only_an_error_that_names_the_file_is_no_finding(
     monkeypatch.setitem(READERS, "broken", Reader(answer, ("*",), reworded, read))
     finding = Attempts("broken", 0, tmp_path)(0)
     assert (finding is None) == (found is None)
-    assert finding is None or found in finding.what
+    assert finding is None or (found and found in finding.what)
 
 
 def test_an_input_follows_from_its_number_alone(tmp_path: Path) -> None:

@@ -103,10 +103,10 @@ def test_what_is_no_picture_or_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match=r"none\.png: cannot be read \(No such file"):
         read_rgb(tmp_path / "none.png")
     (tmp_path / "text.png").write_bytes(b"nothing to see IEND\xaeB`\x82")
-    with pytest.raises(SourceError, match=r"text\.png: not a PNG or JPEG that can be decoded"):
+    with pytest.raises(SourceError, match=r"text\.png: not a picture that can be decoded"):
         read_rgb(tmp_path / "text.png")
     (tmp_path / "empty.bmp").touch()
-    with pytest.raises(SourceError, match=r"empty\.bmp: not a PNG or JPEG that can be decoded \(0 bytes\)"):
+    with pytest.raises(SourceError, match=r"empty\.bmp: not a picture that can be decoded \(0 bytes\)"):
         read_rgb(tmp_path / "empty.bmp")
 
 

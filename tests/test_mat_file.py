@@ -63,12 +63,12 @@ def test_what_is_written_by_hand_is_read(tmp_path: Path) -> None:
         ((matrix((1, 1), b"x", kind=16),), "field a is no array of real numbers"),
         ((matrix((1, 1), b"x" * 8, array_class=2),), "field a is no array of real numbers"),
         ((element(14, b"12345678", size=1 << 31),), "does not fit in"),
-        ((b"\1\2\3",), "damaged"),
-        ((element(15, b"not compressed"),), "damaged"),
+        ((b"\1\2\3",), "requires a buffer"),
+        ((element(15, b"not compressed"),), "incorrect header check"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(elements: tuple[bytes, ...], complaint: str, tmp_path: Path) -> None:
-    with pytest.raises(SourceError, match=rf"a\.mat: the MATLAB file is damaged.*{complaint}|{complaint}"):
+    with pytest.raises(SourceError, match=rf"a\.mat: the MATLAB file is damaged \(.*{complaint}"):
         read_arrays(write(tmp_path / "a.mat", *elements), ("a",))
 
 

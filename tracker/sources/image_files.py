@@ -75,7 +75,7 @@ def decode_image(data: bytes, flag: int, where: str, end: bytes | None = None) -
     except cv2.error as error:
         raise SourceError(f"{where}: not a picture that can be decoded ({error})") from error
     if image is None:
-        raise SourceError(f"{where}: not a PNG or JPEG that can be decoded ({len(data)} bytes)")
+        raise SourceError(f"{where}: not a picture that can be decoded ({len(data)} bytes); expected a PNG or a JPEG")
     return image
 
 
