@@ -61,6 +61,7 @@ def test_a_chunk_that_claims_more_than_the_file_has_is_refused(tmp_path: Path) -
     with pytest.raises(SourceError, match=r"a\.png: not a picture that can be decoded"):
         read_rgb(tmp_path / "a.png")
     assert picture_size(png(6, 5)[:-12] + chunk(b"IEND", b"", 1 << 30)) is None
+    assert picture_size(png(6, 5).replace(b"IDAT", b"IxAT")) is None
     assert picture_size(png(6, 5) + b"what follows is nobody's") == (6, 5)
 
 

@@ -135,8 +135,10 @@ class Intrinsics:
 
     def check(self) -> None:
         """Raises FrameError where focal length or principal point do not suit the image size."""
-        if min(self.width, self.height) < 1 or self.width * self.height > MOST_PIXELS:
-            raise FrameError(f"an image has 1 to {MOST_PIXELS} pixels, got {self.width} x {self.height}")
+        if min(self.width, self.height) < 1:
+            raise FrameError(f"an image has at least one pixel, got {self.width} x {self.height}")
+        if self.width * self.height > MOST_PIXELS:
+            raise FrameError(f"an image has at most {MOST_PIXELS} pixels, got {self.width} x {self.height}")
         values = (self.fx, self.fy, self.cx, self.cy)
         size = max(self.width, self.height)
         if not np.isfinite(values).all() or not all(0.1 * size < f < 20 * size for f in (self.fx, self.fy)):

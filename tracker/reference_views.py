@@ -48,7 +48,9 @@ def unpacked(arrays: Mapping[str, npt.NDArray], headers: Sequence[Any], object_i
     """The frames again, empty outside the box. Raises ValueError where arrays and headers do not fit together."""
     total = sum(_pixels(header) for header in headers)
     if not total <= MOST_VIEWED:  # a file holds the boxes alone, and may claim what it likes of the rest
-        raise ValueError(f"{len(headers)} reference views of {total} pixels together, expected at most {MOST_VIEWED}")
+        raise ValueError(
+            f"damaged: {len(headers)} reference views of {total} pixels together, expected at most {MOST_VIEWED}"
+        )
     return tuple(
         _unpacked([arrays[f"view{k}.{part}"] for part in PARTS], header, object_id) for k, header in enumerate(headers)
     )

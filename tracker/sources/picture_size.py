@@ -21,11 +21,13 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 
 def _png_size(data: bytes) -> tuple[int, int] | None:
     """Where every chunk fits into the data: a decoder makes room for what a chunk claims to hold."""
-    at, kind = len(PNG_START), b""
+    at, kind, kinds = len(PNG_START), b"", set()
     while kind != b"IEND":
         kind = data[at + 4 : at + 8]
+        kinds.add(kind)
         at += 12 + struct.unpack_from(">I", data, at)[0]
-    return struct.unpack_from(">II", data, 16) if at <= len(data) and data[12:16] == b"IHDR" else None
+    whole = at <= len(data) and data[12:16] == b"IHDR" and b"IDAT" in kinds  # without it a decoder reads on
+    return struct.unpack_from(">II", data, 16) if whole else None
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int] | None:
