@@ -139,6 +139,8 @@ def read_preset(name_or_path: str) -> Preset:
     path = preset_path(name_or_path)
     try:
         return Preset.model_validate(read_yaml(path))
+    except UnicodeEncodeError as error:  # half of a pair of surrogates, as an escape
+        raise ConfigError(f"{path}: holds characters that no text has ({error.reason})") from error
     except ValidationError as error:
         raise ConfigError("; ".join(f"{path}: {_complaint(each)}" for each in error.errors())) from error
 
