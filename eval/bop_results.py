@@ -17,6 +17,7 @@ import numpy as np
 from tracker.bop_rows import COLUMNS, Estimate, check_rotation, write_results
 from tracker.errors import OutputError, SourceError
 from tracker.geometry import Floats, Pose
+from tracker.sources.text_files import is_whole
 
 __all__ = ["Estimate", "read_results", "write_results"]
 
@@ -108,6 +109,6 @@ def _numbers(row: dict[str, str], name: str, count: int) -> Floats:
 
 def _whole(row: dict[str, str], name: str) -> int:
     text = row[name].strip()
-    if not (text.isascii() and text.isdigit()):
+    if not is_whole(text):
         raise ValueError(f"{name} is {text!r}, expected a whole number from 0")
     return int(text)

@@ -16,17 +16,25 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from eval.bop_results import read_results, write_results
 from eval.frame_record import FrameRecord
-from eval.predict import Tracked
+from eval.predict import ObjectInImage, Tracked
 from eval.summary import TrackingCounts
 from eval.track_run import fingerprint_of
 from tracker.errors import OutputError
+from tracker.sources.json_files import DAMAGE
 from tracker.viewer import FRAMES, RECORDING, VIDEO
 
 log = logging.getLogger(__name__)
 
 ESTIMATES, UNIT = "estimates.csv", "unit.json"
+_REFERENCES = TypeAdapter(list[ObjectInImage])
+_COUNTS = TypeAdapter(dict[str, TrackingCounts])
+_TIMINGS = TypeAdapter(list[dict[str, float]])
+_REFUSED = TypeAdapter(dict[str, str])
+_RECORDS = TypeAdapter(list[FrameRecord])
 
 
 class KeptUnits:
@@ -58,13 +66,13 @@ class KeptUnits:
                 raise ValueError("it is not what was written")
             return Tracked(
                 estimates=estimates,
-                reference_frames={(scene_id, object_id, image) for scene_id, object_id, image in content["references"]},
-                counts={object_id: TrackingCounts(**counts) for object_id, counts in content["counts"].items()},
-                timings_ms=content["timings_ms"],
-                refused=content["refused"],
-                records=[FrameRecord(**record) for record in content["records"]],
+                reference_frames=set(_REFERENCES.validate_python(content["references"])),
+                counts=_COUNTS.validate_python(content["counts"]),
+                timings_ms=_TIMINGS.validate_python(content["timings_ms"]),
+                refused=_REFUSED.validate_python(content["refused"]),
+                records=_RECORDS.validate_python(content["records"]),
             )
-        except (OSError, KeyError, TypeError, ValueError, AttributeError, OutputError) as error:
+        except (OSError, RecursionError, *DAMAGE, OutputError) as error:
             log.warning("%s: cannot be used (%s) and is tracked again", folder, error)
             shutil.rmtree(folder, ignore_errors=True)
             return None

@@ -7,10 +7,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from tracker.errors import ConfigError
+from tracker.yaml_files import read_yaml
 
 SHIPPED = Path(__file__).with_name("presets")
 
@@ -138,11 +138,9 @@ def read_preset(name_or_path: str) -> Preset:
     """A shipped preset by its name, or one from a file. Raises ConfigError that names the file and the key in it."""
     path = preset_path(name_or_path)
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{path}: cannot be read as YAML ({error})") from error
-    try:
-        return Preset.model_validate(content)
+        return Preset.model_validate(read_yaml(path))
+    except UnicodeEncodeError as error:  # half of a pair of surrogates, as an escape
+        raise ConfigError(f"{path}: holds characters that no text has ({error.reason})") from error
     except ValidationError as error:
         raise ConfigError("; ".join(f"{path}: {_complaint(each)}" for each in error.errors())) from error
 

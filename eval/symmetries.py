@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from tracker.geometry import ROTATION_TOLERANCE, Floats
 
 MAX_SYM_DISC_STEP = 0.01  # BOP: no vertex moves by more than this share of the diameter between two steps
+MOST_LISTED = 1000  # each is followed by every step about each axis: what a file can ask for is bounded
 STEPS = int(np.ceil(np.pi / MAX_SYM_DISC_STEP))  # 315 an axis
 
 
@@ -68,6 +69,10 @@ class ObjectSymmetries:
         points_m = np.reshape(np.asarray(offsets_m, np.float64), (-1, 3))
         if not np.isfinite(matrices).all() or not np.isfinite(points_m).all() or not (lengths > 0).all():
             raise ValueError(f"a symmetry is finite and its axis a direction; got {directions.tolist()}")
+        if max(len(matrices), len(directions)) > MOST_LISTED:
+            raise ValueError(
+                f"at most {MOST_LISTED} motions and axes are read, got {len(matrices)} and {len(directions)}"
+            )
         if len(points_m) != len(directions):
             raise ValueError(f"every axis has a point on it; got {len(directions)} axes and {len(points_m)} points")
         return cls(Motions(turns, matrices[:, :3, 3]), directions / lengths, points_m)

@@ -13,11 +13,11 @@ import yaml
 
 from tracker.errors import ConfigError
 from tracker.whole_file import write_whole
+from tracker.yaml_files import read_yaml
 
 SHIPPED = Path(__file__).with_name("vocabularies")
 LONGEST_LABEL = 64
 LONGEST_TEXT = 200
-LARGEST_FILE = 1_000_000
 KEYS = ("name", "vocabularies")
 KEYS_OF_A_VOCABULARY = ("category", "ids", "kind", "source", "labels")
 HEADER = "# Concepts to look for on objects: short labels, all different. Edit them as you like.\n"
@@ -136,17 +136,12 @@ def read_vocabulary(name_or_path: str) -> VocabularySet:
     shipped = shipped_vocabularies()
     path = SHIPPED / f"{name_or_path}.yaml" if name_or_path in shipped else Path(name_or_path)
     try:
-        if not path.is_file():
-            raise ConfigError(
-                f"there is no vocabulary {name_or_path!r}; expected a file, or one of {', '.join(shipped)}"
-            )
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_FILE + 1)
-        if len(raw) > LARGEST_FILE:
-            raise ConfigError(f"{path}: larger than a vocabulary can be, expected at most {LARGEST_FILE} bytes")
-        content = yaml.safe_load(raw.decode())
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise ConfigError(f"{path}: cannot be read as YAML ({error})") from error
+        found = path.is_file()
+    except OSError as error:  # a name that no file can have
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
+    if not found:
+        raise ConfigError(f"there is no vocabulary {name_or_path!r}; expected a file, or one of {', '.join(shipped)}")
+    content = read_yaml(path)
     entries = _mapping(content, KEYS, f"{path}: the file").get("vocabularies")
     if not isinstance(entries, list):
         raise ConfigError(f"{path}: vocabularies: got {reprlib.repr(entries)}, expected a list")

@@ -26,8 +26,8 @@ FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("
 # Each imports only from those before it. A new module needs a place here.
 ORDER = {
     "tracker": (
-        "errors", "system_libraries", "whole_file", "handover", "geometry", "frame", "first_masks", "in_order",
-        "sources", "latest", "view", "pointing", "saliency", "cloud", "region", "reference_views",
+        "errors", "system_libraries", "whole_file", "yaml_files", "handover", "geometry", "frame", "first_masks",
+        "in_order", "sources", "latest", "view", "pointing", "saliency", "cloud", "region", "reference_views",
         "grounding", "symmetry", "declared_symmetry", "concept", "revolution", "measures", "matching", "appearance",
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "verification", "refinement", "confidence",

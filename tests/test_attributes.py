@@ -333,3 +333,14 @@ def test_a_vocabulary_that_cannot_be_measured_is_refused(
 def test_there_are_no_weights_to_load() -> None:
     with pytest.raises(ConfigError, match="no weights"):
         open_backend("attributes", BackendOptions(weights="large"))
+
+
+def test_an_object_that_is_said_to_be_nearly_at_the_lens_takes_no_more_memory_than_another(
+    can_frames: list[Frame], attributes: SaliencyBackend
+) -> None:
+    frame = replace(can_frames[0], depth_m=np.full_like(can_frames[0].depth_m, 1e-6))
+    view = view_object(frame, frame.masks["soup_can"], 0.1, ViewConfig())
+    assert view is not None
+    assert view.pixels_across > 1e6
+    (saliency,) = attributes([Query(view, attributes.labels_for(None))])
+    assert np.isfinite(saliency.maps).all()

@@ -137,14 +137,14 @@ def test_a_scene_or_a_folder_that_is_not_there_is_named_with_what_there_is(bop_d
     ("file", "content", "complaint"),
     [
         ("scene_camera.json", None, r"scene_camera\.json: cannot be read \(No such file"),
-        ("scene_camera.json", '{"2": {"cam_K": [60, 0', r"scene_camera\.json: not the JSON .* column"),
+        ("scene_camera.json", '{"2": {"cam_K": [60, 0', r"scene_camera\.json: not JSON .* column"),
         ("scene_camera.json", "[1, 2]", r"scene_camera\.json: not the JSON"),
         ("scene_camera.json", '{"first": {}}', r"scene_camera\.json: not the JSON"),
         ("scene_camera.json", "{}", r"scene_camera\.json lists no image"),
-        ("scene_gt.json", '{"2": [{"obj_id": 4}', r"scene_gt\.json: not the JSON"),
+        ("scene_gt.json", '{"2": [{"obj_id": 4}', r"scene_gt\.json: not JSON"),
         ("scene_gt.json", '{"2": [{"cam_t_m2c": [0, 0, 1]}]}', r"scene_gt\.json: image 2 .* obj_id"),
         ("scene_gt.json", '{"2": 4}', r"scene_gt\.json: image 2 .* obj_id"),
-        ("scene_gt_info.json", "gone", r"scene_gt_info\.json: not the JSON"),
+        ("scene_gt_info.json", "gone", r"scene_gt_info\.json: not JSON"),
     ],
 )
 def test_a_damaged_list_is_named_when_the_scene_is_opened(

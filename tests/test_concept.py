@@ -140,6 +140,8 @@ def test_a_model_of_another_version_is_refused_with_both_versions_and_what_to_do
         ({"format": "a language model"}, "but not a concept model"),
         ({"labels": None}, "header's labels is None, expected a list"),
         ({"labels": "red"}, "header's labels is 'red', expected a list"),
+        ({"labels": []}, r"header's labels are \[\], expected texts"),
+        ({"labels": ["red", 5, None]}, "header's labels are .*, expected texts"),
         ({"labels": ["red", "flat"]}, r"saliency has shape \(60, 3\) \(expected \(60, 2\)\)"),
         ({"object_id": 5}, "header's object_id is 5, expected a str"),
         ({"backend": None}, "header's backend"),
@@ -157,6 +159,7 @@ def test_a_model_of_another_version_is_refused_with_both_versions_and_what_to_do
         ({"symmetry": SYMMETRY | {"axis": [0, 0, 2]}}, "axis is a unit vector or null"),
         ({"diameter_m": "wide"}, "header's diameter_m is 'wide', expected a float"),
         ({"diameter_m": 0.0}, r"header's diameter_m is 0\.0, expected a length"),
+        ({"diameter_m": 1e9}, "expected a length in metres"),
         ({"diameter_m": float("nan")}, "header's diameter_m is nan, expected a length"),
     ],
 )
@@ -172,7 +175,11 @@ def test_a_header_that_cannot_be_right_is_refused_by_what_is_wrong(
     [
         ("normals", np.zeros((59, 3)), r"normals has shape \(59, 3\) \(expected \(60, 3\)\)"),
         ("points", np.full((60, 3), np.nan), "points .* not finite"),
+        ("points", np.full((60, 3), 1e200), "points has values beyond 1000"),
+        ("points", np.zeros((60, 3), np.int32), "points .* is of int32"),
+        ("saliency", np.full((60, 3), 1e30, np.float32), "saliency has values beyond 2"),
         ("view_count", np.zeros((60, 1), np.int32), "view_count has shape"),
+        ("view_count", np.zeros(60, np.float32), "view_count .* is of float32"),
         ("agreement", None, "not a whole concept model .*agreement"),
     ],
 )
@@ -186,6 +193,50 @@ def test_arrays_that_cannot_be_right_are_refused_by_name(
     safetensors.numpy.save_file(kept, saved, metadata=metadata)
     with pytest.raises(ModelError, match=rf"mug\.concept: {complaint}"):
         ConceptModel.load(saved)
+
+
+def test_a_header_that_is_no_object_is_refused(saved: Path) -> None:
+    for text in ("[]", "5", '"text"', "[" * 5000):
+        safetensors.numpy.save_file({"points": np.zeros((3, 3))}, saved, metadata={"concept_model": text})
+        with pytest.raises(ModelError, match=r"mug\.concept: "):
+            ConceptModel.load(saved)
+
+
+def test_views_that_claim_more_pictures_than_there_is_memory_are_refused_before_they_are_made(saved: Path) -> None:
+    camera = [6000.0, 6000.0, 2880.0, 2880.0, 5760, 5760]  # 8 bytes a pixel, and the file holds none of them
+    with pytest.raises(ModelError, match=r"mug\.concept: .*9 reference views of 298598400.* expected at most"):
+        ConceptModel.load(rewritten(with_views(saved, 9), references=[{"camera": camera}] * 9))
+    for header, complaint in (
+        (view_of(15_000), "an image has at most"),
+        ("a view", "damaged"),
+        ({"camera": [60, 60, 5, 5, 10**400, 10]}, "damaged"),
+        (view_of(10) | {"x": "left"}, "damaged"),
+        (view_of(10) | {"depth_unit_m": float("nan")}, "damaged"),
+    ):
+        with pytest.raises(ModelError, match=rf"mug\.concept: .*a reference view is damaged.*{complaint}|{complaint}"):
+            ConceptModel.load(rewritten(with_views(saved, 1), references=[header]))
+
+
+def with_views(path: Path, count: int) -> Path:
+    """Arrays of so many views of one pixel, whatever the header says."""
+    with safetensors.safe_open(path, framework="numpy") as file:
+        arrays = {name: file.get_tensor(name) for name in ARRAYS}
+        metadata = file.metadata()
+    kinds = {
+        "rgb": np.zeros((1, 1, 3), np.uint8),
+        "depth": np.zeros((1, 1), np.uint16),
+        "mask": np.zeros((1, 1), np.uint8),
+    }
+    views = {f"view{k}.{part}": array for k in range(count) for part, array in kinds.items()}
+    safetensors.numpy.save_file(arrays | views, path, metadata=metadata)
+    return path
+
+
+def view_of(size: int) -> dict[str, Any]:
+    """The header of a view."""
+    camera = [size, size, size / 2, size / 2, size, size]
+    told = {"depth_unit_m": 0.001, "T_cam_obj": np.eye(4).tolist(), "source": "", "index": 0}
+    return {"x": 0, "y": 0, "camera": camera, **told}
 
 
 def test_what_is_no_model_is_named(tmp_path: Path) -> None:

@@ -134,3 +134,22 @@ def test_the_device_is_found_or_named() -> None:
     for absent in ("cuda:99", "abacus"):
         with pytest.raises(ConfigError, match=f"device '{absent}' cannot be used here: "):
             _ = TrackerConfig(device=absent).torch_device
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["a: 2001-99-99", "a: !!bool x", "a: !!timestamp x", "[" * 5000, "a: " + "1" * 5000, "? {a}", "#" * 2_000_000],
+)
+def test_yaml_that_the_parser_stumbles_over_is_named(content: str, tmp_path: Path) -> None:
+    (tmp_path / "settings.yaml").write_text(content)
+    with pytest.raises(ConfigError, match=r"settings\.yaml: (cannot be read as YAML|larger than such a file can be)"):
+        read_config(tmp_path / "settings.yaml")
+
+
+def test_a_few_lines_that_stand_for_billions_make_a_short_complaint(tmp_path: Path) -> None:
+    rows = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
+    rows += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]" for k in range(1, 10)]
+    (tmp_path / "settings.yaml").write_text("\n".join((*rows, "seed: [*a9]")))
+    with pytest.raises(ConfigError, match="seed") as caught:
+        read_config(tmp_path / "settings.yaml")
+    assert len(str(caught.value)) < 5000

@@ -257,6 +257,12 @@ def test_a_camera_matrix_that_cannot_belong_to_the_picture_is_refused(K: list[li
         Intrinsics.from_matrix(K, 640, 480)
 
 
+def test_a_camera_of_more_pixels_than_any_has_is_refused() -> None:
+    Intrinsics(7000, 7000, 3839.5, 2159.5, 7680, 4320).check()
+    with pytest.raises(FrameError, match="at most 33554432 pixels, got 100000 x 100000"):
+        Intrinsics(1e5, 1e5, 5e4, 5e4, 100_000, 100_000).check()
+
+
 def test_a_camera_without_pixels_is_refused() -> None:
     with pytest.raises(FrameError, match="at least one pixel, got 0 x 480"):
         Intrinsics.from_matrix(CAMERA.matrix, 0, 480)

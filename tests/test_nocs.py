@@ -234,3 +234,9 @@ def test_what_is_missing_is_named(nocs: Path) -> None:
         dataset.model(MUG)
     with pytest.raises(SourceError, match="no scene"):
         NocsDataset(nocs / "gts")
+
+
+def test_an_object_is_called_by_no_path(nocs: Path) -> None:
+    write_text(nocs / "real_test" / "scene_1" / "0000_meta.txt", "2 6 ../../../mug\n")
+    with pytest.raises(SourceError, match=r"0000_meta\.txt: '../../../mug' cannot be the name of a folder"):
+        NocsDataset(nocs).targets(1)

@@ -55,8 +55,10 @@ def test_what_was_written_is_read_and_models_are_found_from_anywhere(
 
 
 @pytest.mark.parametrize(
-    "text", [None, "no json", "[]", '{"source": "a"}', '{"source": "a", "models": [], "at": [], "x": 1}']
-)
+    "text", [None, "no json", "[]", '{"source": "a"}', '{"source": "a", "models": [], "at": [], "x": 1}',
+     '{"source": 5, "models": [], "at": []}', '{"source": "a", "models": "b.concept", "at": []}',
+     '{"source": "a", "models": [1], "at": []}', "[" * 5000]
+)  # fmt: skip
 def test_a_folder_without_a_whole_run_is_refused(text: str | None, tmp_path: Path) -> None:
     if text is not None:
         (tmp_path / FILE).write_text(text)

@@ -58,11 +58,12 @@ def test_motions_are_rigid_and_the_first_is_none() -> None:
         {"symmetries_discrete": [[float("nan")] * 16]},
         {"symmetries_discrete": [[*OVER[:3], float("nan"), *OVER[4:]]]},
         {"symmetries_discrete": np.transpose(np.reshape([*OVER[:3], 900.0, *OVER[4:]], (4, 4))).tolist()},
+        {"symmetries_discrete": [np.eye(4).ravel().tolist()] * 2000},
         {"symmetries_continuous": [{"axis": [0, 0, 0], "offset": [0, 0, 0]}]},
         {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, float("inf")]}]},
         {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": []}]},
     ],
 )
 def test_what_is_no_symmetry_is_refused(entry: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=r"symmetry|reshape|axis"):
+    with pytest.raises(ValueError, match=r"symmetry|reshape|axis|at most 1000 motions"):
         ObjectSymmetries.from_models_info(entry)

@@ -9,7 +9,15 @@ import pytest
 
 from tests.recordings import pose, write_matrix
 from tracker.errors import SourceError
-from tracker.sources.text_files import read_lines, read_numbers, read_points, read_pose
+from tracker.sources.text_files import (
+    is_whole,
+    path_within,
+    read_lines,
+    read_numbers,
+    read_points,
+    read_pose,
+    require_plain_name,
+)
 
 
 def write(path: Path, content: str | bytes) -> Path:
@@ -50,3 +58,24 @@ def test_a_scale_is_left_out_only_where_there_may_be_one(tmp_path: Path) -> None
     assert np.allclose(read_pose(tmp_path / "a.txt", scaled=True).matrix, pose(0.1).matrix)
     with pytest.raises(SourceError, match=r"a\.txt: not a rotation"):
         read_pose(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize("name", ["/etc/passwd", "../a.png", "rgb/../../a.png", "rgb/..", "a\0.png", "a\n.png"])
+def test_a_file_that_a_list_names_is_in_the_folder(name: str, tmp_path: Path) -> None:
+    assert path_within(tmp_path, "rgb/1.5.png", "rgb.txt") == tmp_path / "rgb" / "1.5.png"
+    assert path_within(tmp_path, "a..b.png", "rgb.txt") == tmp_path / "a..b.png"
+    with pytest.raises(SourceError, match=r"^rgb\.txt: .* is not in "):
+        path_within(tmp_path, name, "rgb.txt")
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "a/b", "../mug", "a\0b", "x" * 300])
+def test_a_thing_that_folders_are_called_after_leads_to_no_other(name: str) -> None:
+    require_plain_name("025_mug", "classes.txt")
+    require_plain_name("größte Tasse..", "classes.txt")
+    with pytest.raises(SourceError, match=r"^classes\.txt: .* cannot be the name of a folder"):
+        require_plain_name(name, "classes.txt")
+
+
+def test_whole_numbers_are_those_that_everybody_writes_so() -> None:
+    assert all(map(is_whole, ("0", "000012", "9" * 18)))
+    assert not any(map(is_whole, ("", "-1", "1.0", "1_0", "٣", "²", "9" * 19)))

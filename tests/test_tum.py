@@ -182,3 +182,21 @@ def test_a_picture_that_is_missing_is_named_and_the_others_still_read(tmp_path: 
     with pytest.raises(SourceError, match=rf"depth/{stamp(1)}\.png: cannot be read"):
         source[1]
     assert source[0].depth_m == pytest.approx(1)
+
+
+@pytest.mark.parametrize("outside", ["/etc/passwd", "../other/a.png", "/dev/zero"])
+@pytest.mark.parametrize("file", ["rgb.txt", "depth.txt", "associations.txt"])
+def test_a_list_names_no_file_of_another_folder(tmp_path: Path, file: str, outside: str) -> None:
+    path = write(tmp_path, [stamp(0)], [stamp(0)])
+    row = f"{stamp(0)} {outside}"
+    (path / file).write_text(row if file != "associations.txt" else f"{stamp(0)} rgb/{stamp(0)}.png {row}")
+    with pytest.raises(SourceError, match=rf"{file}: '{outside}' is not in "):
+        TumFolder(f"{path}{K}")
+
+
+@pytest.mark.parametrize("seconds", ["1e999999999", "9" * 30, "nan", "1e-999999999x"])
+def test_a_stamp_that_no_clock_shows_is_refused_with_its_list(tmp_path: Path, seconds: str) -> None:
+    path = write(tmp_path, [stamp(0)], [stamp(0)])
+    (path / "rgb.txt").write_text(f"{seconds} rgb/{stamp(0)}.png")
+    with pytest.raises(SourceError, match=r"rgb\.txt: a stamp is "):
+        TumFolder(f"{path}{K}")

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from reference.vocabulary import (
     HEADER,
-    LARGEST_FILE,
     LONGEST_LABEL,
     SHIPPED,
     Vocabulary,
@@ -25,6 +24,7 @@ from reference.vocabulary import (
 )
 from tracker.errors import ConfigError, OutputError
 from tracker.saliency.vision_language import GENERAL_LABELS
+from tracker.yaml_files import LARGEST_FILE
 
 MUG = Vocabulary("mug", ("handle", "rim"), ids=("14", "025_mug"))
 BOWL = Vocabulary("bowl", ("rim", "foot"), ids=("13", "024_bowl"))

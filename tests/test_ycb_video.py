@@ -164,7 +164,7 @@ def test_no_picture_is_decoded_before_it_is_asked_for(ycb: Path) -> None:
         ({"poses": None}, "field poses is missing; expected intrinsic_matrix, factor_depth, cls_indexes, poses"),
         ({"factor_depth": None}, "field factor_depth is missing"),
         ({"factor_depth": 0}, "field factor_depth: expected one positive number"),
-        ({"factor_depth": "ten"}, "field factor_depth: expected finite numbers"),
+        ({"factor_depth": "ten"}, r"the MATLAB file is damaged \(field factor_depth is no array of real numbers"),
         ({"intrinsic_matrix": np.eye(4)}, r"field intrinsic_matrix: expected 3x3, got shape \(4, 4\)"),
         ({"cls_indexes": [14, 22]}, "field cls_indexes: expected class numbers from 1 to 21"),
         ({"cls_indexes": [14, 14]}, "field cls_indexes: .* each once"),
@@ -246,3 +246,9 @@ def test_the_released_keyframes_are_2949_with_14025_instances() -> None:
     assert dataset.scene_ids == tuple(range(48, 60))
     assert len({(scene_id, t.image_id) for scene_id, t in targets}) == 2949
     assert len(targets) == 14_025
+
+
+def test_a_class_is_called_by_no_path(ycb: Path) -> None:
+    write_text(ycb / "image_sets" / "classes.txt", f"{MUG}\n../../{BOWL}\n")
+    with pytest.raises(SourceError, match=r"classes\.txt: '../../024_bowl' cannot be the name of a folder"):
+        YcbVideoDataset(ycb)

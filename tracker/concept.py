@@ -6,6 +6,7 @@ On disk it is a safetensors file: arrays and a JSON header, nothing that could r
 from __future__ import annotations
 
 import json
+import reprlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -23,12 +24,16 @@ from tracker.grounding import ground
 from tracker.reference_views import PARTS, packed, unpacked
 from tracker.region import Region, region_of
 from tracker.saliency import SaliencyBackend, open_backend
+from tracker.sources.json_files import DAMAGE
 from tracker.symmetry import NO_SYMMETRY, Symmetry
 from tracker.view import Float32s
 from tracker.whole_file import write_whole
 
 FORMAT_VERSION = 2
 FORMAT = "conceptrack concept model"
+FARTHEST_M = 1000.0  # from the origin of the object's coordinates
+# Beyond what any model holds, so that no number of a file overflows later on.
+MOST_OF = {"points": FARTHEST_M, "normals": 100, "view_directions": 100, "colours": 256, "saliency": 2, "agreement": 2}
 ARRAYS = ("points", "normals", "colours", "saliency", "view_count", "agreement", "view_directions")
 
 
@@ -131,7 +136,7 @@ class ConceptModel:
                 names = (f"view{k}.{part}" for k in range(len(header["references"])) for part in PARTS)
                 symmetry = Symmetry.unpacked(header["symmetry"])
                 views = unpacked({n: file.get_tensor(n) for n in names}, header["references"], header["object_id"])
-        except (safetensors.SafetensorError, ValueError, OSError) as error:
+        except (safetensors.SafetensorError, OSError, RecursionError, *DAMAGE) as error:
             raise ModelError(f"{path}: not a whole concept model ({error})") from error
         _check_arrays(path, arrays, len(header["labels"]))
         return cls(
@@ -147,8 +152,8 @@ class ConceptModel:
         )
 
 
-def _check_header(path: Path, header: dict[str, Any]) -> None:
-    if header.get("format") != FORMAT:
+def _check_header(path: Path, header: Any) -> None:
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ModelError(f"{path}: a safetensors file, but not a concept model")
     if header.get("version") != FORMAT_VERSION:
         raise ModelError(
@@ -167,9 +172,13 @@ def _check_header(path: Path, header: dict[str, Any]) -> None:
     }
     for key, kind in expected.items():
         if not isinstance(header.get(key), kind):
-            raise ModelError(f"{path}: the header's {key} is {header.get(key)!r}, expected a {kind.__name__}")
-    if not 0 < header["diameter_m"] < np.inf:
+            raise ModelError(
+                f"{path}: the header's {key} is {reprlib.repr(header.get(key))}, expected a {kind.__name__}"
+            )
+    if not 0 < header["diameter_m"] < FARTHEST_M:
         raise ModelError(f"{path}: the header's diameter_m is {header['diameter_m']}, expected a length in metres")
+    if not header["labels"] or not all(isinstance(label, str) for label in header["labels"]):
+        raise ModelError(f"{path}: the header's labels are {reprlib.repr(header['labels'])}, expected texts")
 
 
 def _check_arrays(path: Path, arrays: dict[str, np.ndarray], concepts: int) -> None:
@@ -184,8 +193,13 @@ def _check_arrays(path: Path, arrays: dict[str, np.ndarray], concepts: int) -> N
         "view_directions": (len(arrays["view_directions"]), 3),
     }
     for name, shape in shapes.items():
-        if arrays[name].shape != shape or not np.isfinite(arrays[name]).all():
-            raise ModelError(f"{path}: {name} has shape {arrays[name].shape} (expected {shape}) or is not finite")
+        array, kinds = arrays[name], "iu" if name == "view_count" else "f"
+        if array.shape != shape or array.dtype.kind not in kinds or not np.isfinite(array).all():
+            raise ModelError(
+                f"{path}: {name} has shape {array.shape} (expected {shape}), is of {array.dtype}, or is not finite"
+            )
+        if np.abs(array).max(initial=0) > MOST_OF.get(name, np.inf):
+            raise ModelError(f"{path}: {name} has values beyond {MOST_OF[name]}")
 
 
 def told_apart(models: Sequence[ConceptModel]) -> list[ConceptModel]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -21,6 +22,7 @@ from tracker.saliency.device import torch_device
 from tracker.silhouette import SilhouetteConfig
 from tracker.verification import VerificationConfig
 from tracker.view import ViewConfig
+from tracker.yaml_files import read_yaml
 
 
 class TrackerConfig(BaseModel):
@@ -80,11 +82,7 @@ def read_config(path: str | Path | None) -> TrackerConfig:
     """
     if path is None:
         return TrackerConfig()
-    try:
-        content = yaml.safe_load(Path(path).read_text())
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{path}: cannot be read as YAML ({error})") from error
-    return parse_config(content or {}, str(path))
+    return parse_config(read_yaml(Path(path)) or {}, str(path))
 
 
 def parse_config(content: Any, where: str) -> TrackerConfig:
@@ -104,7 +102,7 @@ def _complaint(error: Any) -> str:
     if error["type"] == "extra_forbidden":
         known = _settings_at([str(part) for part in error["loc"][:-1]])
         return f"there is no setting {name!r}; there are {', '.join(known)}"
-    return f"{name}: {error['msg']} (got {error['input']!r})"
+    return f"{name}: {error['msg']} (got {reprlib.repr(error['input']):.200})"
 
 
 def _settings_at(path: list[str]) -> list[str]:

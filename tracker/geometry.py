@@ -13,6 +13,7 @@ from tracker.errors import FrameError
 
 Floats = npt.NDArray[np.floating]
 
+MOST_PIXELS = 1 << 25  # 8K: what a file can make a reader allocate is bounded by it
 ROTATION_TOLERANCE = 1e-3  # what rounding in text files costs; anything worse is another convention
 
 
@@ -136,6 +137,8 @@ class Intrinsics:
         """Raises FrameError where focal length or principal point do not suit the image size."""
         if min(self.width, self.height) < 1:
             raise FrameError(f"an image has at least one pixel, got {self.width} x {self.height}")
+        if self.width * self.height > MOST_PIXELS:
+            raise FrameError(f"an image has at most {MOST_PIXELS} pixels, got {self.width} x {self.height}")
         values = (self.fx, self.fy, self.cx, self.cy)
         size = max(self.width, self.height)
         if not np.isfinite(values).all() or not all(0.1 * size < f < 20 * size for f in (self.fx, self.fy)):

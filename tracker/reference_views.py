@@ -10,10 +10,12 @@ import numpy.typing as npt
 
 from tracker.errors import TrackerError
 from tracker.frame import Frame, PosedFrame, Provenance
-from tracker.geometry import Intrinsics, Pose
+from tracker.geometry import MOST_PIXELS, Intrinsics, Pose
+from tracker.sources.json_files import DAMAGE
 from tracker.view import Box, bounding_box
 
 PARTS = ("rgb", "depth", "mask")
+MOST_VIEWED = 8 * MOST_PIXELS  # of all views together, as whole pictures
 DEPTH_STEPS = 65535  # depth is kept in so many steps up to its greatest value: finer than any sensor's
 
 
@@ -44,9 +46,22 @@ def packed(views: Sequence[PosedFrame]) -> tuple[dict[str, npt.NDArray], list[di
 
 def unpacked(arrays: Mapping[str, npt.NDArray], headers: Sequence[Any], object_id: str) -> tuple[PosedFrame, ...]:
     """The frames again, empty outside the box. Raises ValueError where arrays and headers do not fit together."""
+    total = sum(_pixels(header) for header in headers)
+    if not total <= MOST_VIEWED:  # a file holds the boxes alone, and may claim what it likes of the rest
+        raise ValueError(
+            f"damaged: {len(headers)} reference views of {total} pixels together, expected at most {MOST_VIEWED}"
+        )
     return tuple(
         _unpacked([arrays[f"view{k}.{part}"] for part in PARTS], header, object_id) for k, header in enumerate(headers)
     )
+
+
+def _pixels(header: Any) -> float:
+    try:
+        width, height = (float(v) for v in header["camera"][4:6])
+    except DAMAGE as error:
+        raise ValueError(f"a reference view is damaged: {error!r}") from error
+    return abs(width * height)
 
 
 def _unpacked(parts: list[npt.NDArray], header: Any, object_id: str) -> PosedFrame:
@@ -56,8 +71,6 @@ def _unpacked(parts: list[npt.NDArray], header: Any, object_id: str) -> PosedFra
         camera.check()
         size = (camera.height, camera.width)
         place = np.s_[header["y"] : header["y"] + len(parts[0]), header["x"] : header["x"] + parts[0].shape[1]]
-        if max(size) > 20_000:
-            raise ValueError(f"a picture of {camera.width} x {camera.height} pixels")
         rgb, depth_m, mask = np.zeros((*size, 3), np.uint8), np.zeros(size, np.float32), np.zeros(size, bool)
         rgb[place], mask[place] = parts[0], parts[2]
         depth_m[place] = parts[1] * np.float32(header["depth_unit_m"])
@@ -66,5 +79,5 @@ def _unpacked(parts: list[npt.NDArray], header: Any, object_id: str) -> PosedFra
         T_cam_obj = np.array(header["T_cam_obj"], np.float64)
         Pose.from_matrix(T_cam_obj)  # refuses what is none; what it returns is rounded anew, and a saved pose stays
         return PosedFrame(frame, object_id, Pose(T_cam_obj[:3, :3], T_cam_obj[:3, 3]), mask)
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, TrackerError) as error:
+    except (*DAMAGE, TrackerError) as error:
         raise ValueError(f"a reference view is damaged: {error}") from error

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
 from tracker.concept import ConceptModel, told_apart
 from tracker.config import TrackerConfig, read_config
 from tracker.errors import OutputError, SourceError
@@ -27,6 +29,8 @@ class SavedRun:
     """source: as it was opened. models: paths of the concept models. weights, device: of the backend. at: objects that
     were pointed out in the first frame, as --at has them."""
 
+    __pydantic_config__ = ConfigDict(strict=True, extra="forbid")
+
     source: str
     models: tuple[str, ...]
     weights: str | None = None
@@ -45,12 +49,16 @@ class SavedRun:
     def load(cls, folder: Path) -> SavedRun:
         """Raises OutputError where there is none, or it is damaged."""
         try:
-            content = json.loads((folder / FILE).read_text(encoding="utf-8"))
-            return cls(**content | {"models": tuple(content["models"]), "at": tuple(content["at"])})
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            return _RUN.validate_json((folder / FILE).read_bytes())
+        except (OSError, ValidationError) as error:
+            first = {} if isinstance(error, OSError) else error.errors()[0]
+            why = f"{'.'.join(map(str, first['loc']))}: {first['msg']}" if first else str(error)
             raise OutputError(
-                f"{folder / FILE} cannot be used ({error}); expected a folder that python -m tracker --out wrote"
+                f"{folder / FILE} cannot be used ({why}); expected a folder that python -m tracker --out wrote"
             ) from error
+
+
+_RUN = TypeAdapter(SavedRun)
 
 
 class Replay:

@@ -19,6 +19,7 @@ from tracker.confidence import Grounds
 from tracker.errors import ConfigError
 from tracker.frame import Mask
 from tracker.geometry import Floats
+from tracker.sources.json_files import DAMAGE
 from tracker.whole_file import write_whole
 
 log = logging.getLogger(__name__)
@@ -90,7 +91,7 @@ def read_poses(path: Path) -> list[JudgedPose]:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise ConfigError(f"{path}: poses.{where}: {first['msg']}; expected what --json wrote") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (RecursionError, *DAMAGE) as error:
         raise ConfigError(f"{path}: expected a JSON file that --json wrote, with 'poses' ({error!r})") from error
     if content.get("code") != code_fingerprint():
         log.warning("%s: other source code than this has found its poses; track anew for weights of this one", path)

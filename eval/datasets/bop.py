@@ -10,11 +10,9 @@ https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +23,7 @@ from tracker.errors import SourceError
 from tracker.geometry import Floats
 from tracker.sources import Sighting
 from tracker.sources.bop import BopScene, scene_ids
+from tracker.sources.json_files import DAMAGE, read_json
 
 log = logging.getLogger(__name__)
 
@@ -81,7 +80,7 @@ class BopDataset:
         folder = self._beside(*MODEL_FOLDERS)
         if folder is None:
             raise SourceError(f"{self.name}: there is no folder {' or '.join(MODEL_FOLDERS)}, which scoring needs")
-        info = _read_json(folder / "models_info.json")
+        info = read_json(folder / "models_info.json")
         numbers = sorted(int(file.stem[4:]) for file in folder.glob("obj_*.ply") if file.stem[4:].isdigit())
         require("model in " + str(folder), object_id, [str(number) for number in numbers], self.name)
         try:
@@ -89,7 +88,7 @@ class BopDataset:
             diameter_m = float(entry["diameter"]) / 1000
             symmetries = ObjectSymmetries.from_models_info(entry)
             declared = any(key.startswith("symmetries_") for other in info.values() for key in other)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except DAMAGE as error:
             raise SourceError(f"{folder}/models_info.json: object {object_id}: {error!r}") from error
         points_m, triangles = _read_mesh(folder / f"obj_{int(object_id):06d}.ply")
         _check_units(folder, object_id, points_m, diameter_m)
@@ -129,23 +128,14 @@ def _read_targets(path: Path | None) -> dict[int, list[tuple[int, int]]] | None:
     targets: dict[int, set[tuple[int, int]]] = {}
     several = 0
     try:
-        for entry in _read_json(path):
+        for entry in read_json(path):
             targets.setdefault(int(entry["scene_id"]), set()).add((int(entry["im_id"]), int(entry["obj_id"])))
             several += int(entry.get("inst_count", 1)) > 1
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except DAMAGE as error:
         raise SourceError(f"{path}: not a list of scene_id, im_id, obj_id and inst_count ({error!r})") from error
     if several:
         log.warning("%s: %d targets have several instances of the object; only the first is scored", path, several)
     return {scene_id: list(pairs) for scene_id, pairs in targets.items()}
-
-
-def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text())
-    except OSError as error:
-        raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise SourceError(f"{path}: not JSON ({error})") from error
 
 
 def _read_mesh(path: Path) -> tuple[Floats, npt.NDArray[np.integer] | None]:
@@ -159,7 +149,7 @@ def _read_mesh(path: Path) -> tuple[Floats, npt.NDArray[np.integer] | None]:
         triangles = np.asarray(getattr(mesh, "faces", ()), np.int64).reshape(-1, 3)
     except Exception as error:  # the parser raises what it stumbles over
         raise SourceError(f"{path}: not a PLY file that can be read ({error!r})") from error
-    if points_m.ndim != 2 or not len(points_m) or not np.isfinite(points_m).all():
+    if points_m.shape[1:] != (3,) or not len(points_m) or not np.isfinite(points_m).all():
         raise SourceError(f"{path}: expected finite vertices, got shape {points_m.shape}")
     return points_m, triangles if len(triangles) else None
 

@@ -44,6 +44,6 @@ def _read_vertices(path: Path) -> Floats:
         points = np.asarray(getattr(mesh, "vertices", ()), np.float64)
     except Exception as error:  # the parser raises what it stumbles over
         raise SourceError(f"{path}: not a mesh that can be read ({error!r})") from error
-    if points.ndim != 2 or not len(points) or not np.isfinite(points).all():
+    if points.shape[1:] != (3,) or not len(points) or not np.isfinite(points).all():
         raise SourceError(f"{path}: expected finite vertices, got shape {points.shape}")
     return points

@@ -28,7 +28,7 @@ from eval.datasets import MaskKind, ObjectModel, Target, name_of, number_of, req
 from eval.datasets.labelled_scene import Annotation, ImageFiles, LabelledScene
 from eval.datasets.model_files import read_model
 from tracker.errors import SourceError
-from tracker.sources.text_files import read_lines, read_numbers, read_pose
+from tracker.sources.text_files import is_whole, read_lines, read_numbers, read_pose, require_plain_name
 
 log = logging.getLogger(__name__)
 
@@ -165,11 +165,12 @@ def _read_meta(path: Path) -> dict[str, tuple[int, int]]:
     """Object -> (instance, class), without bystanders; of an object that occurs twice the first."""
     instances: dict[str, tuple[int, int]] = {}
     for words in map(str.split, read_lines(path)):
-        if len(words) != 3 or not (words[0] + words[1]).isdecimal():
+        if len(words) != 3 or not is_whole(words[0]) or not is_whole(words[1]):
             raise SourceError(f"{path}: expected lines INSTANCE CLASS NAME, got {' '.join(words)[:60]!r}")
         instance, class_id = int(words[0]), int(words[1])
         if instance >= BACKGROUND or class_id >= len(CLASSES):
             raise SourceError(f"{path}: instances are below {BACKGROUND}, classes below {len(CLASSES)}, got {words}")
+        require_plain_name(words[2], str(path))
         if class_id:
             instances.setdefault(words[2], (instance, class_id))
     return instances

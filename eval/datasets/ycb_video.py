@@ -12,24 +12,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.io import loadmat
 
 from eval.datasets import MaskKind, ObjectModel, Target, name_of, number_of, require, require_visible_masks
 from eval.datasets.labelled_scene import Annotation, ImageFiles, LabelledScene
+from eval.datasets.mat_file import read_arrays
 from eval.datasets.model_files import read_model
 from eval.datasets.ycb_objects import YCB_VIDEO_CLASSES, YCB_VIDEO_FRAME, is_symmetric, shape_files
 from tracker.errors import FrameError, SourceError
 from tracker.geometry import Pose
 from tracker.sources.raw_depth import metres_per_unit
-from tracker.sources.text_files import read_lines
+from tracker.sources.text_files import read_lines, require_plain_name
 
 META_FIELDS = ("intrinsic_matrix", "factor_depth", "cls_indexes", "poses")
-MAT_FILE_HEADER = b"MATLAB 5.0 MAT-file"
 KEYFRAME_FILES = ("keyframe.txt", "image_sets/keyframe.txt")
 
 
@@ -95,6 +93,8 @@ def _read_classes(path: Path) -> tuple[str, ...]:
     names = tuple(read_lines(path)) if path.exists() else YCB_VIDEO_CLASSES
     if not names or len(set(names)) != len(names):
         raise SourceError(f"{path}: expected a name a line, each once, got {len(names)} lines")
+    for name in names:
+        require_plain_name(name, str(path))
     return names
 
 
@@ -150,20 +150,11 @@ def _read_annotation(path: Path, names: Sequence[str]) -> Annotation:
 
 def _read_meta(path: Path) -> dict[str, npt.NDArray]:
     """The fields that are used, each an array of numbers."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
-    if not data.startswith(MAT_FILE_HEADER):  # anything else would be read as MATLAB 4, sizes and all
-        raise SourceError(f"{path}: not a MATLAB 5 file ({len(data)} bytes)")
-    try:
-        meta = loadmat(BytesIO(data), variable_names=META_FIELDS)
-    except Exception as error:  # the parser raises what it stumbles over
-        raise SourceError(f"{path}: the MATLAB file is damaged ({error!r})") from error
+    meta = read_arrays(path, META_FIELDS)
     for name in META_FIELDS:
         if name not in meta:
             raise SourceError(f"{path}: field {name} is missing; expected {', '.join(META_FIELDS)}")
-        _check(path, name, meta[name].dtype.kind in "fiu" and np.isfinite(meta[name]).all(), "finite numbers", meta)
+        _check(path, name, bool(np.isfinite(meta[name]).all()), "finite numbers", meta)
     return meta
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from eval.datasets import Dataset, Target, require
 from eval.pairs import Pair, View
 from tracker.errors import OutputError, SourceError
+from tracker.sources.text_files import is_whole
 
 LINE = "SPLIT, SCENE IMAGE, SCENE IMAGE, OBJECT"
 
@@ -73,22 +74,18 @@ def _pairs(path: Path, lines: Sequence[str], dataset: Dataset) -> Iterator[Pair]
 
 def _place(cell: str) -> tuple[int, int]:
     numbers = cell.split()
-    if len(numbers) != 2 or not all(_is_whole(number) for number in numbers):
+    if len(numbers) != 2 or not all(is_whole(number) for number in numbers):
         raise SourceError(f"expected SCENE IMAGE, two whole numbers, got {cell!r}")
     return int(numbers[0]), int(numbers[1])
 
 
 def _object(cell: str, dataset: Dataset) -> str:
     number, _, name = cell.partition(" ")
-    if not _is_whole(number):
+    if not is_whole(number):
         raise SourceError(f"expected the object as NUMBER or NUMBER NAME, got {cell!r}")
     object_id = name.strip() or dataset.object_with(int(number))
     require("object", object_id, dataset.object_ids, dataset.name)
     return object_id
-
-
-def _is_whole(text: str) -> bool:
-    return text.isascii() and text.isdigit()
 
 
 class _Truth:

@@ -112,6 +112,7 @@ def lab_of(rgb: Float32s) -> Float32s:
 
 def smooth_inside(values: Float32s, weights: Float32s, sigma_px: float) -> Float32s:
     """Gaussian smoothing of (h, w, C) values in which only pixels with weight (h, w) take part."""
+    sigma_px = min(sigma_px, 4 * max(weights.shape))  # flatter it cannot get; depth of nearly 0 asks for kilometres
     total = cv2.GaussianBlur(values * weights[:, :, None], (0, 0), sigma_px)
     share = cv2.GaussianBlur(weights, (0, 0), sigma_px)
     return np.asarray(total.reshape(values.shape) / np.maximum(share, 1e-3)[:, :, None], np.float32)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tracker.errors import ConfigError
+from tracker.sources.json_files import DAMAGE
 
 logger = logging.getLogger(__name__)
 
@@ -82,7 +83,7 @@ def _checked(folder: Path, name: str, model_types: Sequence[str]) -> Checkpoint:
     try:
         config = json.loads(path.read_text(encoding="utf-8"))
         model_type = config["model_type"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, RecursionError, *DAMAGE) as error:
         raise ConfigError(f"{path}: not the configuration of a model ({error!r})") from error
     if model_type not in model_types:
         raise ConfigError(f"{folder}: weights of a {model_type!r}, expected {' or '.join(map(repr, model_types))}")

@@ -10,7 +10,6 @@ image's own. Millimetres end here. https://github.com/thodan/bop_toolkit/blob/ma
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -23,11 +22,12 @@ from tracker.frame import Frame, Mask, Provenance
 from tracker.geometry import Intrinsics, Pose
 from tracker.sources import Sighting, require_object
 from tracker.sources.image_files import read_depth_m, read_mask, read_rgb
+from tracker.sources.json_files import DAMAGE, read_json
 from tracker.sources.raw_depth import metres_per_unit
+from tracker.sources.text_files import is_whole
 
 NOMINAL_RATE_HZ = 30.0  # the layout has no stamps
 MASK_FOLDERS = {"visib": "mask_visib", "full": "mask"}
-DAMAGE = (KeyError, IndexError, TypeError, ValueError)  # what reading an entry of another layout comes to
 
 
 class BopScene:
@@ -128,7 +128,10 @@ class BopScene:
             return Sighting(index, T_cam_obj, visible_px, 1.0 if visible_px else 0.0)
         try:
             info = self._info[image_id][place]
-            return Sighting(index, T_cam_obj, int(info["px_count_visib"]), float(info["visib_fract"]))
+            visible_px, visible_fraction = int(info["px_count_visib"]), float(info["visib_fract"])
+            if visible_px < 0 or not 0 <= visible_fraction < np.inf:
+                raise ValueError(f"{visible_px} visible pixels, {visible_fraction} of the object")
+            return Sighting(index, T_cam_obj, visible_px, visible_fraction)
         except DAMAGE as error:
             raise SourceError(f"{self._folder}/scene_gt_info.json: {where}: {error!r}") from error
 
@@ -185,13 +188,10 @@ def scene_ids(path: Path) -> list[int]:
 
 def _by_image(path: Path) -> dict[int, Any]:
     """A JSON object keyed by image id. Raises SourceError that names the file and the place of the damage."""
-    try:
-        content = json.loads(path.read_text())
-        return {int(key): value for key, value in content.items()}
-    except OSError as error:
-        raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, AttributeError) as error:
-        raise SourceError(f"{path}: not the JSON that BOP's layout has there ({error})") from error
+    content = read_json(path)
+    if not isinstance(content, dict) or not all(is_whole(key) for key in content):
+        raise SourceError(f"{path}: not the JSON that BOP's layout has there, whose keys are the numbers of images")
+    return {int(key): value for key, value in content.items()}
 
 
 def _objects_by_image(path: Path) -> dict[int, list[dict[str, Any]]]:

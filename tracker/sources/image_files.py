@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tracker.errors import SourceError
+from tracker.geometry import MOST_PIXELS
+from tracker.sources.picture_size import picture_size
 from tracker.sources.raw_depth import raw_to_metres, require_unit
 
 PNG_END = b"IEND\xaeB`\x82"
@@ -55,7 +57,7 @@ def read_labels(path: Path) -> npt.NDArray[np.integer]:
 
 
 def decode_image(data: bytes, flag: int, where: str, end: bytes | None = None) -> npt.NDArray:
-    """A PNG or JPEG, or what else OpenCV knows, as `cv2.imdecode` gives it.
+    """A PNG or JPEG, as `cv2.imdecode` gives it. Of other kinds the size is not known before they are decoded.
 
     end: the marker that has to be there; if None that of what the data begin like.
     Raises SourceError, which begins with `where`, for a picture that is not whole or cannot be decoded.
@@ -65,9 +67,15 @@ def decode_image(data: bytes, flag: int, where: str, end: bytes | None = None) -
         end = PNG_END if data.startswith(b"\x89PNG") else JPEG_END if data.startswith(b"\xff\xd8") else b""
     if end not in data.rstrip(b"\0")[-64:]:
         raise SourceError(f"{where}: the file is truncated ({len(data)} bytes, no end marker)")
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), flag) if data else None
+    size = picture_size(data)
+    if size and size[0] * size[1] > MOST_PIXELS:
+        raise SourceError(f"{where}: a picture of {size[0]} x {size[1]} pixels, expected at most {MOST_PIXELS}")
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), flag) if size else None
+    except cv2.error as error:
+        raise SourceError(f"{where}: not a picture that can be decoded ({error})") from error
     if image is None:
-        raise SourceError(f"{where}: not a picture that can be decoded ({len(data)} bytes)")
+        raise SourceError(f"{where}: not a picture that can be decoded ({len(data)} bytes); expected a PNG or a JPEG")
     return image
 
 

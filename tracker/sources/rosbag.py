@@ -108,7 +108,8 @@ class _Messages:
         try:
             yield reader
         finally:
-            reader.close()
+            with self._damage("cannot be closed"):  # what it knows of itself may be the bag's nonsense
+                reader.close()
 
     def topics(self, reader: Reader1 | Reader2) -> list[Topic]:
         """Those that are there, with what their first messages say."""

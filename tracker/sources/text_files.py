@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from tracker.errors import FrameError, SourceError
 from tracker.geometry import Floats, Pose
+
+LONGEST_NUMBER = 18  # digits of a scene, an image or an object: none is larger than 64 bits hold
+LONGEST_NAME = 200  # bytes; a file's has at most 255, with what comes after it
 
 
 def read_lines(path: Path) -> list[str]:
@@ -51,6 +54,28 @@ def read_pose(path: Path, *, scaled: bool = False) -> Pose:
         return Pose.from_matrix(matrix)
     except FrameError as error:
         raise SourceError(f"{path}: {error}") from error
+
+
+def is_whole(text: str) -> bool:
+    """Whether it is a whole number from 0, in digits that everybody writes, of a size that a number of a file has."""
+    return text.isascii() and text.isdecimal() and len(text) <= LONGEST_NUMBER
+
+
+def require_plain_name(name: str, where: str) -> None:
+    """Of a thing that a file lists and folders are called after. Raises SourceError, which begins with `where`, for one
+    that leads to another folder, and for one that no folder can have."""
+    if name in (".", "..") or "/" in name or not name.isprintable() or not 0 < len(name.encode()) <= LONGEST_NAME:
+        raise SourceError(f"{where}: {name[:60]!r} cannot be the name of a folder")
+
+
+def path_within(folder: Path, name: str, where: str) -> Path:
+    """The file of a recording that a list in it names. Raises SourceError, which begins with `where`, where it is not
+    in the folder: a recording that was made by somebody else decides which of its own files are read, and no others.
+    """
+    parts = PurePosixPath(name)
+    if parts.is_absolute() or ".." in parts.parts or not name.isprintable():
+        raise SourceError(f"{where}: {name[:200]!r} is not in {folder}; pictures are named from there, without '..'")
+    return folder / parts
 
 
 def _read(path: Path, expected: str) -> Floats:

@@ -17,7 +17,7 @@ import logging
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from pathlib import Path
 
 import cv2
@@ -31,7 +31,7 @@ from tracker.sources.lens import Lens
 from tracker.sources.query import number, read_query
 from tracker.sources.raw_depth import metres_per_unit
 from tracker.sources.raw_frame import raw_to_frame
-from tracker.sources.text_files import read_lines
+from tracker.sources.text_files import path_within, read_lines
 
 logger = logging.getLogger(__name__)
 
@@ -43,6 +43,7 @@ FREIBURG = {
     "freiburg2": Calibration(520.9, 521.0, 325.1, 249.7, (0.2312, -0.7849, -0.0033, -0.0001, 0.9172), "freiburg2"),
     "freiburg3": Calibration(535.4, 539.2, 320.1, 247.6, (), "freiburg3"),
 }
+LAST_STAMP_NS = 2**63
 SLOP_S = 0.02  # that of the benchmark's own associate.py
 NOMINAL_RATE_HZ = 30.0
 OPTIONS = {
@@ -101,13 +102,15 @@ class TumFolder:
             pictures = [self._associated(found, row) for row in rows]
             where, counted = str(found), all(row[0].isdecimal() and len(row[0]) < 10 for row in rows)
         else:
-            rows, depths = _rows(self._path / "rgb.txt", 2), _rows(self._path / "depth.txt", 2)
-            colour_ns, depth_ns = ([_nanoseconds(self._path, row[0]) for row in each] for each in (rows, depths))
-            pictures = [
-                _Pictures(colour_ns[a], self._path / rows[a][1], depth_ns[b], self._path / depths[b][1])
-                for a, b in pair_stamps(colour_ns, depth_ns, slop_ns)
-            ]
-            where, counted = f"{self._path}/rgb.txt and depth.txt ({len(rows)} and {len(depths)} pictures)", False
+            lists = (self._path / "rgb.txt", self._path / "depth.txt")
+            colours, depths = (
+                [(_nanoseconds(file, row[0]), path_within(self._path, row[1], str(file))) for row in _rows(file, 2)]
+                for file in lists
+            )
+            colour_ns, depth_ns = ([stamp_ns for stamp_ns, _ in each] for each in (colours, depths))
+            paired = pair_stamps(colour_ns, depth_ns, slop_ns)
+            pictures = [_Pictures(*colours[a], *depths[b]) for a, b in paired]
+            where, counted = f"{self._path}/rgb.txt and depth.txt ({len(colours)} and {len(depths)} pictures)", False
         if not pictures:
             raise SourceError(f"{where}: no pictures belong together (within {slop_ns / 1e9:g} s); say ?slop=SECONDS")
         pictures.sort(key=lambda of: of.colour_ns)
@@ -121,7 +124,8 @@ class TumFolder:
         if "depth" in row[1] and "depth" not in row[3]:
             row = [*row[2:], *row[:2]]
         stamps_ns = [_nanoseconds(file, row[k]) for k in (0, 2)]
-        return _Pictures(stamps_ns[0], self._path / row[1], stamps_ns[1], self._path / row[3])
+        colour, depth = (path_within(self._path, row[k], str(file)) for k in (1, 3))
+        return _Pictures(stamps_ns[0], colour, stamps_ns[1], depth)
 
     def _camera(self, K: tuple[float, ...] | Path | None, distortion: tuple[float, ...]) -> Calibration:
         found = find_calibration(K, distortion, [self._path / name for name in CAMERA_FILES])
@@ -147,9 +151,9 @@ def _rows(path: Path, words: int) -> list[list[str]]:
 
 def _nanoseconds(path: Path, seconds: str) -> int:
     try:
-        stamp_ns = int(Decimal(seconds).scaleb(9).to_integral_value())  # more digits than a float holds
-    except (InvalidOperation, ValueError, OverflowError) as error:
-        raise SourceError(f"{path}: a stamp is a number of seconds, got {seconds!r}") from error
-    if stamp_ns < 0:
-        raise SourceError(f"{path}: a stamp is not before 0, got {seconds!r}")
-    return stamp_ns
+        stamp_ns = Decimal(seconds).scaleb(9)  # more digits than a float holds
+        if not 0 <= stamp_ns < LAST_STAMP_NS:
+            raise SourceError(f"{path}: a stamp is not before 0, nor after the year 2262, got {seconds[:60]!r}")
+        return int(stamp_ns.to_integral_value())
+    except ArithmeticError as error:  # what is no number is one of them
+        raise SourceError(f"{path}: a stamp is a number of seconds, got {seconds[:60]!r}") from error
