@@ -51,7 +51,7 @@ class RegistrationConfig(BaseModel):
     seeding_points: int = Field(default=2000, ge=10)
     seeds: int = Field(default=200, ge=1)
     group: int = Field(default=12, ge=3)
-    candidates: int = Field(default=12, ge=1)
+    candidates: int = Field(default=24, ge=1)
     distinct_rad: float = Field(default=0.2, gt=0)
     distinct_share: float = Field(default=0.12, gt=0)
 
