@@ -15,7 +15,7 @@ from tracker.geometry import Pose
 from tracker.looking import Found, Look, Looking, believed, doubt
 from tracker.refinement import Refined
 from tracker.saliency import Query, SaliencyBackend
-from tracker.search import Hypothesis
+from tracker.search import Hypothesis, Search
 from tracker.sources.synthetic import SyntheticScene
 from tracker.stopwatch import Stopwatch
 from tracker.verification import Evidence
@@ -136,6 +136,24 @@ def test_what_is_found_about_where_somebody_pointed_was_expected_there(
     assert isinstance(found, Found)
     assert found.expected == expected
     assert found.grounds.turn_rad is None  # a place has no pose that another could be turned from
+
+
+def test_of_which_hardly_any_surface_is_in_place_is_not_the_likeliest_whatever_its_colours(
+    can_looking: Counted,
+    can_frames: list[Frame],
+    can_truth: Pose,
+    can_view: ObjectView,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    refined = Refined(can_truth, np.eye(6), np.zeros((0, 6)), 0.0, 100)
+    fits = Hypothesis(refined, replace(GOOD, colour=0.7), "search", can_view)
+    hardly = Hypothesis(refined, replace(GOOD, surface=0.19, colour=0.95), "search", can_view)
+    monkeypatch.setattr(Search, "anywhere", lambda *_: [hardly, fits, hardly])
+    monkeypatch.setattr(Search, "turned", lambda *_: [])
+    found = can_looking([Look(can_frames[0].masks[CAN], None, masked=True)], can_frames[0])
+    assert isinstance(found, Found)
+    assert found.hypothesis is fits
+    assert confidence(Grounds(hardly.evidence, 0.01)) > confidence(Grounds(fits.evidence, 0.01))
 
 
 GOOD = Evidence(

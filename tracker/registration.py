@@ -19,6 +19,10 @@ from tracker.umeyama import Motions, no_motions
 
 FIRST_BATCH = 8192  # samples before the first look at whether more are needed; every further batch is twice as large
 REFITS, SETTLED = 15, 1e-4  # at most so many, or until no entry of a rotation changes by more
+WIDE, NARROWED = (
+    2.0,
+    0.25,
+)  # the first refit's threshold, in thresholds: near-equal optima become one; a refit narrows it
 STARTS = 8  # best hypotheses that are fitted whether or not they are alike
 
 
@@ -163,9 +167,10 @@ def _refit(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> tuple[
     """Every motion fitted to its inliers until they hardly change, those left out that their inliers do not determine,
     the best supported first; the share (B,) of the pairs that are inliers of each, and its support (B,) a pair."""
     threshold_m = config.threshold_m
-    for _ in range(REFITS):
-        before, motions = motions, fitted(pairs, closeness(pairs, motions, threshold_m).square_())  # Tukey's weights
-        if float((motions.rotation - before.rotation).abs().amax()) < SETTLED:
+    for k in range(REFITS):
+        reach_m = threshold_m * max(1.0, WIDE - k * NARROWED)
+        before, motions = motions, fitted(pairs, closeness(pairs, motions, reach_m).square_())  # Tukey's weights
+        if reach_m == threshold_m and float((motions.rotation - before.rotation).abs().amax()) < SETTLED:
             break
     motions = motions[motions.determined]
     inliers = closeness(pairs, motions, threshold_m) > 0
