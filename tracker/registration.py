@@ -19,10 +19,7 @@ from tracker.umeyama import Motions, no_motions
 
 FIRST_BATCH = 8192  # samples before the first look at whether more are needed; every further batch is twice as large
 REFITS, SETTLED = 15, 1e-4  # at most so many, or until no entry of a rotation changes by more
-WIDE, NARROWED = (
-    2.0,
-    0.25,
-)  # the first refit's threshold, in thresholds: near-equal optima become one; a refit narrows it
+WIDE, NARROWED = 2.0, 0.25  # thresholds that a refit begins with, and by how many each is less: near optima become one
 STARTS = 8  # best hypotheses that are fitted whether or not they are alike
 
 
