@@ -15,7 +15,7 @@ from tracker.looking import Asking, Found, Look, Looking
 from tracker.pointing import Pointer
 from tracker.proposals import Proposals
 from tracker.stopwatch import Stopwatch
-from tracker.whereabouts import Whereabouts, middle_m
+from tracker.whereabouts import Whereabouts
 
 SAME_RAD, SAME_SHARE = 0.05, 0.03  # poses nearer than this angle and share of the diameter are looked at once
 MOVED_ON = 0.4  # diameters that it may have moved while nobody saw it
@@ -125,9 +125,6 @@ class Places:
         for k, start in enumerate(starts):
             contested = k < len(starts) - 1
             yield Look(mask, start, tuple(starts[: k + 1]), masked=True, contested=contested)
-        place_m = middle_m(mask, now.frame)  # a mask may hold half of something else
-        if place_m is not None:
-            yield Look(now.unclaimed(self._proposals.around(place_m, now.frame)), None, tuple(starts), place_m)
 
     def _near(self, moving: Pose | None, now: Moment, look: Looking) -> Iterator[Look | str]:
         """Near each pose that is expected, of which there is one at least; where it is clearly at none, anywhere around

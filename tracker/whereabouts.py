@@ -84,14 +84,7 @@ class Whereabouts:
 
     def point_out(self, mask: Mask, frame: Frame, camera: CameraMotion) -> None:
         """A mask (H, W) of this frame says that it is there."""
-        place_m = middle_m(mask, frame)
-        if place_m is not None:
-            self._pointed_out = _Place.at(Pose(np.eye(3), place_m), camera)
-
-
-def middle_m(mask: Mask, frame: Frame) -> Floats | None:
-    """(3,) the middle of what is measured within a mask, camera coordinates; None where nothing is."""
-    rows, columns = np.nonzero(mask & (frame.depth_m > 0))
-    if not len(rows):
-        return None
-    return np.median(frame.intrinsics.unproject(columns, rows, frame.depth_m[rows, columns].astype(np.float64)), axis=0)
+        rows, columns = np.nonzero(mask & (frame.depth_m > 0))
+        if len(rows):
+            points = frame.intrinsics.unproject(columns, rows, frame.depth_m[rows, columns].astype(np.float64))
+            self._pointed_out = _Place.at(Pose(np.eye(3), np.median(points, axis=0)), camera)
