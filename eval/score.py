@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,6 +27,8 @@ from eval.summary import (
 )
 from eval.symmetries import STEPS
 from eval.visible_surface import DELTA_M
+
+log = logging.getLogger(__name__)
 
 # What a score depends on and scoring cannot see: the run says it, or the report shows that nobody did.
 STATED_BY_THE_RUN = ("backend", "masks", "initialisation", "reinitialisation", "poses")
@@ -132,6 +135,7 @@ def score_results_file(
     or an object that the dataset does not have.
     """
     estimates: Sequence[Estimate] = read_results(results, known_to(dataset))
+    _warn_of_silence(dataset, estimates, str(results), object_ids)
     stated: dict[str, object] = {"results": str(results)}
     if align_on is not None:
         aligned = align(dataset, estimates, align_on, scene_ids, object_ids)
@@ -148,6 +152,21 @@ def score_results_file(
         symmetric=symmetric,
         with_vsd=with_vsd,
     )
+
+
+def _warn_of_silence(
+    dataset: Dataset, estimates: Sequence[Estimate], results: str, object_ids: Sequence[str] | None
+) -> None:
+    """Of objects that the file says nothing of every instance counts as missing."""
+    answered = {dataset.object_with(estimate.object_id) for estimate in estimates}
+    silent = [name for name in (dataset.object_ids if object_ids is None else object_ids) if name not in answered]
+    if silent and answered:
+        log.warning(
+            "%s has no row of object %s: all its instances count as missing; --objects %s leaves it out",
+            results,
+            ", ".join(silent),
+            " ".join(sorted(answered)),
+        )
 
 
 def _protocol(
@@ -188,7 +207,7 @@ def _protocol(
 
 def _about_vsd(without_mesh: Sequence[str], with_vsd: bool) -> str:
     if not with_vsd:
-        return "not measured: it was not asked for"
+        return "not measured: --vsd asks for it"
     if without_mesh:
         return f"not measured: no mesh, only points, of {', '.join(without_mesh)}"
     return f"BOP19, delta {1000 * DELTA_M:.0f} mm, distance images"

@@ -231,7 +231,7 @@ def test_the_protocol_has_what_scoring_decides_and_what_the_run_stated() -> None
     assert (protocol["initialisation"], protocol["reinitialisation"], protocol["poses"]) == ("not stated",) * 3
     assert protocol["missing_pose"] == "infinite error"
     assert (protocol["symmetric_objects"], protocol["symmetric_objects_are"]) == (["tin"], "the dataset's")
-    assert (protocol["mspd"], protocol["vsd"]) == ("measured", "not measured: it was not asked for")
+    assert (protocol["mspd"], protocol["vsd"]) == ("measured", "not measured: --vsd asks for it")
     assert "VOCap" in str(protocol["integration"])
     assert {"averaging", "frames", "reference_frames", "model_frame", "dataset", "scenes"} <= set(protocol)
 
@@ -352,3 +352,15 @@ def test_perfect_poses_of_the_recording_score_a_hundred(shared_data: Path) -> No
     scores = score(dataset, perfect)
     assert scores.pooled["instances"] == len(perfect)
     assert rounded(scores.pooled, "add_auc", "adds_auc_2cm_exact", "add_recall_0.1d", "missing") == [100, 100, 100, 0]
+
+
+def test_an_object_of_which_a_file_says_nothing_at_all_is_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    write_results(tmp_path / "a.csv", [estimate("tin", 1, 10)])
+    score_results_file(Table(), tmp_path / "a.csv")
+    (warning,) = caplog.messages
+    assert all(words in warning for words in ("no row of object cup", "--objects tin"))
+    caplog.clear()
+    score_results_file(Table(), tmp_path / "a.csv", object_ids=["tin"])
+    assert caplog.messages == []

@@ -151,7 +151,8 @@ class Track:
                     STDERR.print("there are no more frames; the page stays until ctrl-C")
                     page.stay("there are no more frames")
             except KeyboardInterrupt:
-                ALWAYS.print("stopped; what was tracked is kept")
+                kept = "what was tracked is kept" if folder else "nothing was to be kept, as there is no --out"
+                ALWAYS.print(f"stopped; {kept}")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error
             for output in outputs:
