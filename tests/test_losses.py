@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +11,11 @@ import pytest
 
 import eval.__main__
 from eval.datasets.synthetic import SyntheticDataset
-from eval.losses.cause import CAUSES, Loss, Tracer
+from eval.losses.cause import CAUSES, WRONG_M, Loss, Tracer
 from eval.losses.scene import FARTHEST_M, UNDER, points_lost
-from reference.onboard import onboard
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
-from tracker.frame import Frame, PosedFrame
+from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
 from tracker.saliency import SaliencyBackend
 from tracker.sources.synthetic import SyntheticScene
@@ -41,29 +39,28 @@ def test_an_empty_mask_shows_too_little(trace: Tracer, can_frames: list[Frame], 
     assert loss == Loss(CAN, float("inf"), "little seen")
 
 
-def test_a_mask_of_something_else_is_the_mask_s_fault(trace: Tracer, can_frames: list[Frame], can_truth: Pose) -> None:
-    own = can_frames[0].masks[CAN]
-    around = np.zeros_like(own)
-    rows, columns = np.nonzero(own)
-    around[max(rows.min() - 60, 0) : rows.max() + 60, max(columns.min() - 60, 0) : columns.max() + 60] = True
-    loss = trace(can_frames[0], around & ~own, can_truth)
-    assert loss.cause in {"unseen side", "mask", "little seen"}
-    assert loss.error_m > 0.01
+def upper_part(mask: Mask, share: float) -> Mask:
+    rows = np.nonzero(mask.any(axis=1))[0]
+    part = mask.copy()
+    part[rows[0] + round(share * len(rows)) :] = False
+    return part
 
 
-def test_a_side_that_the_model_does_not_know_is_the_cause(
-    can_scene: SyntheticScene, can_model: ConceptModel, attributes: SaliencyBackend
+def test_what_is_found_with_the_whole_mask_was_lost_to_the_mask(
+    trace: Tracer, can_frames: list[Frame], can_truth: Pose
 ) -> None:
-    sighting = can_scene.sightings(CAN)[0]
-    frame = can_scene[0]
-    lower = frame.masks[CAN].copy()
-    rows = np.nonzero(lower.any(axis=1))[0]
-    lower[: rows[0] + (2 * len(rows)) // 3] = False  # the model knows the lower third alone
-    model = onboard([PosedFrame(frame, CAN, sighting.T_cam_obj, lower)], attributes)
-    model = replace(model, diameter_m=can_model.diameter_m)
-    trace = Tracer(model, SyntheticDataset(can_scene).model(CAN), attributes, TrackerConfig())
-    upper = frame.masks[CAN] & ~lower
-    assert trace(frame, upper, sighting.T_cam_obj).cause in {"unseen side", "little seen"}
+    loss = trace(can_frames[0], upper_part(can_frames[0].masks[CAN], 0.15), can_truth)
+    assert loss.cause == "mask"
+    assert loss.error_m > WRONG_M
+
+
+def test_what_the_model_does_not_explain_at_the_true_pose_is_a_side_that_it_does_not_know(
+    trace: Tracer, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    own = can_frames[0].masks[CAN]
+    above = np.zeros_like(own)
+    above[: np.nonzero(own.any(axis=1))[0][0]] = True
+    assert trace(can_frames[0], upper_part(own, 0.25) | above, can_truth).cause == "unseen side"
 
 
 def test_points_are_the_area_that_is_lacking() -> None:

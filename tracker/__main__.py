@@ -151,7 +151,7 @@ class Track:
                     STDERR.print("there are no more frames; the page stays until ctrl-C")
                     page.stay("there are no more frames")
             except KeyboardInterrupt:
-                kept = "what was tracked is kept" if folder else "nothing was to be kept, as there is no --out"
+                kept = "what was tracked is kept" if folder or self.record or self.rrd else "nothing was to be kept"
                 ALWAYS.print(f"stopped; {kept}")
             except TrackerError as error:  # a frame that cannot be read does not cost those before it
                 failure = error

@@ -25,7 +25,7 @@ from tracker.saliency import Query, SaliencyBackend
 from tracker.search import Hypothesis, Search, Sight
 from tracker.silhouette import Silhouette
 from tracker.stopwatch import Stopwatch
-from tracker.view import view_object
+from tracker.view import ObjectView, view_object
 
 WRONG_M = 0.01  # ADD, of a symmetric object ADD-S, from which on a pose counts as wrong
 KNOWN = 0.5  # share of the object's pixels that the model explains at the true pose: less is a side that it lacks
@@ -87,8 +87,9 @@ class Tracer:
 
     def _cause(self, frame: Frame, mask: Mask, truth: Pose, found: TrackResult) -> str:
         view = view_object(frame, mask, self._model.diameter_m, self._config.view)
-        sight = None if view is None else Sight.of(view, masked=True)
-        at_truth = None if sight is None else self._search.continued(truth, sight, Stopwatch())
+        if view is None:
+            return "little seen"
+        at_truth = self._search.continued(truth, Sight.of(view, masked=True), Stopwatch())
         if at_truth is None:
             return "little seen"
         if at_truth.evidence.explained < KNOWN:
@@ -103,7 +104,7 @@ class Tracer:
             alike = adds(self._shape.points_m, [reached], [truth])[0] <= WRONG_M
             return "turn" if alike else "refinement"
         if found.grounds is None or self._likely(at_truth) > confidence(replace(found.grounds, turn_rad=None)):
-            return "matching" if self._right_share(frame, mask, truth) < ENOUGH_RIGHT else "candidates"
+            return "matching" if self._right_share(view, truth) < ENOUGH_RIGHT else "candidates"
         seen, known = found.grounds.evidence, at_truth.evidence
         return "colour" if seen.surface <= known.surface else "surface"
 
@@ -111,10 +112,7 @@ class Tracer:
         sigma_rad = turn_sigma_rad(at_truth.refined, self._model.symmetry)
         return confidence(Grounds(at_truth.evidence, sigma_rad))
 
-    def _right_share(self, frame: Frame, mask: Mask, truth: Pose) -> float:
-        view = view_object(frame, mask, self._model.diameter_m, self._config.view)
-        if view is None:
-            return 0.0
+    def _right_share(self, view: ObjectView, truth: Pose) -> float:
         (saliency,) = self._backend([Query(view, self._model.labels)])
         cloud = lift(view, saliency, self._config.cloud)
         matches = self._match(cloud)
