@@ -50,9 +50,8 @@ class Look:
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """A pose, and what speaks for it. expected: it was about there, or somebody said that it is. masked: by pixels that
-    are known to be the object's. missed: why it did not even
-    show at the first place where it was looked for; empty where something did. saliency: what concepts said there, None
-    where surface and colours were enough."""
+    are known to be the object's. missed: why it did not even show at the first place where it was looked for; empty
+    where something did. saliency: what concepts said there, None where surface and colours were enough."""
 
     hypothesis: Hypothesis
     grounds: Grounds
@@ -200,6 +199,7 @@ class Looking:
 
     def _found(self, hypothesis: Hypothesis, look: Look) -> Found:
         grounds = self._grounds(hypothesis, look.expected)
+        # What is not believed for its surface is no rival of a pose that may be.
         likely = confidence(grounds) if hypothesis.evidence.surface >= LEAST_SURFACE else 0.0
         found = Found(hypothesis, grounds, likely, self._expects(look, hypothesis), look.masked)
         self.tried.append(found)

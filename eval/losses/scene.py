@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from rich.table import Table
 
-from eval.datasets import open_dataset
+from eval.datasets import Target, open_dataset
 from eval.losses.cause import CAUSES, WRONG_M, Loss, Tracer
 from reference.onboard import onboard, read_reference_frames
 from tracker.config import TrackerConfig
@@ -50,7 +50,7 @@ def losses_of(run: LossRun) -> list[Loss]:
             tracers[object_id] = Tracer(model, dataset.model(object_id), backend, run.config)
             used |= {(each.frame.index, object_id) for each in frames}
     found = []
-    by_index: dict[int, list] = {}
+    by_index: dict[int, list[Target]] = {}
     for target in dataset.targets(run.scene_id):
         if target.object_id in tracers and (target.index, target.object_id) not in used:
             by_index.setdefault(target.index, []).append(target)
