@@ -99,10 +99,10 @@ def sampled(
     order = torch.randperm(len(pairs), generator=generator, device=generator.device)
     steps = 1 + torch.randperm(len(pairs) - 1, generator=generator, device=generator.device)[:few]
     pairs = pairs[torch.cat((order, order))]  # twice, so that a step may go beyond the end
-    two = torch.combinations(torch.arange(few, device=steps.device))[:rounds]
+    one, other = torch.triu_indices(few, few, 1, device=steps.device)[:, :rounds]
     fits = _congruent_after(steps, pairs, slack_m, shortest_m)
-    which, first = (fits[two[:, 0]] & fits[two[:, 1]]).nonzero().unbind(dim=1)
-    triples = torch.stack((first, first + steps[two[which, 0]], first + steps[two[which, 1]]))
+    which, first = (fits[one] & fits[other]).nonzero().unbind(dim=1)
+    triples = torch.stack((first, first + steps[one[which]], first + steps[other[which]]))
     together = _padded(pairs.points, pairs.model_points)
     third = together[triples[1]].sub_(together[triples[2]]).square_().reshape(-1, 2, 4).sum(dim=2).sqrt_()
     triples = triples[:, _congruent(third[:, 0], third[:, 1], slack_m, shortest_m)]
@@ -166,7 +166,8 @@ def _congruent_after(steps: torch.Tensor, pairs: Pairs, slack_m: float, shortest
     cloud as in the model."""
     half = len(pairs) // 2
     twice = torch.cat((pairs.points, pairs.model_points), dim=1).T.contiguous()
-    apart = twice.unfold(1, half, 1)[:, steps].sub_(twice[:, :half].unsqueeze(1)).square_()
+    later = torch.stack([twice[:, step : step + half] for step in steps.tolist()], dim=1)
+    apart = later.sub_(twice[:, :half].unsqueeze(1)).square_()
     edge, model_edge = ((part[0] + part[1]).add_(part[2]).sqrt_() for part in (apart[:3], apart[3:]))
     return _congruent(edge, model_edge, slack_m, shortest_m)
 

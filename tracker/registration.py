@@ -148,16 +148,16 @@ def _needed(best: float, points: int, config: RegistrationConfig) -> float:
 
 def _distinct(motions: Motions, diameter_m: float, most: int, config: RegistrationConfig) -> torch.Tensor:
     """Indices of up to `most` motions, in order, no two alike in angle and in where they put the model's centre."""
+    turns, places_m = motions.rotation.flatten(1).cpu().numpy(), motions.translation.cpu().numpy()
+    near_m, alike = config.distinct_share * diameter_m, 1 + 2 * cos(config.distinct_rad)
     chosen: list[int] = []
-    free = torch.ones(len(motions), dtype=torch.bool, device=motions.rotation.device)
-    turns = motions.rotation.flatten(1)
-    while len(chosen) < most and bool(free.any()):
-        k = int(free.int().argmax())
+    free = np.ones(len(motions), bool)
+    while len(chosen) < most and free.any():
+        k = int(free.argmax())
         chosen.append(k)
-        near = (motions.translation - motions.translation[k]).norm(dim=1) < config.distinct_share * diameter_m
-        free &= ~(near & (turns @ turns[k] > 1 + 2 * cos(config.distinct_rad)))
+        free &= (turns @ turns[k] <= alike) | (np.square(places_m - places_m[k]).sum(axis=1) >= near_m**2)
         free[k] = False
-    return torch.tensor(chosen, dtype=torch.long, device=turns.device)
+    return torch.tensor(chosen, dtype=torch.long, device=motions.rotation.device)
 
 
 def _refit(pairs: Pairs, motions: Motions, config: RegistrationConfig) -> tuple[Motions, torch.Tensor, torch.Tensor]:

@@ -75,24 +75,31 @@ def _solved(
 def triangles(source: torch.Tensor, target: torch.Tensor) -> Motions:
     """What `umeyama` finds for three points each, (B, 3, 3), that go round the same way, without a singular value
     decomposition: one plane is laid on the other, then turned within it."""
-    centre_s, centre_t = source.mean(dim=1), target.mean(dim=1)
+    # B comes last within: sums over three neighbours in memory take several times those over three rows
+    source, target = (corners.permute(1, 2, 0).contiguous() for corners in (source, target))
+    centre_s, centre_t = source.mean(dim=0), target.mean(dim=0)
     axes_s, axes_t = _axes(source), _axes(target)
-    flat_s = (source - centre_s.unsqueeze(1)) @ axes_s[:, :, :2]
-    flat_t = (target - centre_t.unsqueeze(1)) @ axes_t[:, :, :2]
-    cosine = (flat_s * flat_t).sum(dim=(1, 2))
-    sine = (flat_s[..., 0] * flat_t[..., 1] - flat_s[..., 1] * flat_t[..., 0]).sum(dim=1)
-    length = torch.hypot(cosine, sine)
-    cosine, sine = (cosine / length.clamp_min(1e-20))[:, None], (sine / length.clamp_min(1e-20))[:, None]
-    x, y, z = axes_t.unbind(dim=2)
-    turned = torch.stack((cosine * x + sine * y, cosine * y - sine * x, z), dim=2)
-    rotation = turned @ axes_s.transpose(1, 2)
-    translation = centre_t - (rotation @ centre_s.unsqueeze(2)).squeeze(2)
-    return Motions(rotation, translation, torch.ones_like(length), length > 0)
+    x_s, y_s = (((source - centre_s) * axis).sum(dim=1) for axis in axes_s[:2])
+    x_t, y_t = (((target - centre_t) * axis).sum(dim=1) for axis in axes_t[:2])
+    cosine, sine = (x_s * x_t + y_s * y_t).sum(dim=0), (x_s * y_t - y_s * x_t).sum(dim=0)
+    length = (cosine * cosine + sine * sine).sqrt_()
+    cosine, sine = cosine / length.clamp_min(1e-20), sine / length.clamp_min(1e-20)
+    x, y, z = axes_t
+    turned = torch.stack((cosine * x + sine * y, cosine * y - sine * x, z))
+    rotation = (turned.unsqueeze(2) * axes_s.unsqueeze(1)).sum(dim=0)
+    translation = centre_t - (rotation * centre_s).sum(dim=1)
+    return Motions(rotation.permute(2, 0, 1).contiguous(), translation.T, torch.ones_like(length), length > 0)
 
 
 def _axes(corners: torch.Tensor) -> torch.Tensor:
-    """(B, 3, 3) orthonormal columns: along the first edge, across it within the triangle, out of the triangle."""
-    edge, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    along = torch.nn.functional.normalize(edge, dim=1, eps=1e-20)
-    out = torch.nn.functional.normalize(torch.linalg.cross(edge, other), dim=1, eps=1e-20)
-    return torch.stack((along, torch.linalg.cross(out, along), out), dim=2)
+    """(3, 3, B) orthonormal axes of triangles (3, 3, B), corner by corner: along the first edge, across it within the
+    triangle, out of the triangle."""
+    edge, other = corners[1] - corners[0], corners[2] - corners[0]
+    along = _unit(edge)
+    out = _unit(torch.linalg.cross(edge, other, dim=0))
+    return torch.stack((along, torch.linalg.cross(out, along, dim=0), out))
+
+
+def _unit(vectors: torch.Tensor) -> torch.Tensor:
+    """(3, B) of length 1; torch's own norm over rows takes forty times as long."""
+    return vectors / (vectors * vectors).sum(dim=0).sqrt_().clamp_min_(1e-20)
