@@ -271,7 +271,8 @@ def _verdict(model: ConceptModel, path: Path) -> Table:
     table.add_row("diameter seen", f"{model.diameter_m * 1000:.0f} mm")
     table.add_row("surface points", str(quality["points"]))
     table.add_row("viewing sphere", f"{quality['coverage']:.0%} within 60 degrees of a reference view")
-    table.add_row("seen twice", f"{quality['shared']:.0%} of the points, agreeing to {quality['agreement']:.2f}")
+    if len(model.view_directions) > 1:
+        table.add_row("seen twice", f"{quality['shared']:.0%} of the points, agreeing to {quality['agreement']:.2f}")
     table.add_row("symmetry", str(model.symmetry))
     table.add_row("missing", "\n".join(quality["problems"]) or "nothing")
     return table

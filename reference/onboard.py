@@ -89,7 +89,7 @@ def joined_model(
         labels=labels,
         backend=backend.name,
         fingerprint=backend.fingerprint,
-        notes={"reference_frames": [frame.frame.provenance.source for frame in frames]},
+        notes={"reference_frames": [f"frame {f.frame.index} of {f.frame.provenance.source}" for f in frames]},
         references=tuple(frames),
         **{name: getattr(fused, name) for name in fused.__slots__},
     )

@@ -47,7 +47,7 @@ def judge(model: ConceptModel) -> Quality:
             "or check that masks and depth lie on the object"
         )
     if len(model.view_directions) == 1:
-        problems.append("one reference view: only the side that it shows can be tracked")
+        problems.append("one reference view: only the side that it shows can be tracked; add a frame from another side")
     elif spread_rad < LEAST_SPREAD_RAD:
         problems.append(
             f"the reference views differ by {np.degrees(spread_rad):.0f} degrees at most: only one side is known"

@@ -83,10 +83,9 @@ def _said(model: ConceptModel) -> list[str]:
     quality = model.notes.get("quality")
     said = [f"{len(model)} points, diameter seen {model.diameter_m * 1000:.0f} mm, symmetry: {model.symmetry}"]
     if quality:
-        said.append(
-            f"{quality['coverage']:.0%} of the viewing sphere within {np.degrees(SEEN_WITHIN_RAD):.0f} degrees "
-            "of a view; "
-            f"{quality['shared']:.0%} of the points seen twice, agreeing to {quality['agreement']:.2f}"
-        )
+        within = f"within {np.degrees(SEEN_WITHIN_RAD):.0f} degrees of a view"
+        said.append(f"{quality['coverage']:.0%} of the viewing sphere {within}")
+        if len(model.view_directions) > 1:
+            said[-1] += f"; {quality['shared']:.0%} of the points seen twice, agreeing to {quality['agreement']:.2f}"
         said += [f"missing: {problem}" for problem in quality["problems"]]
     return said

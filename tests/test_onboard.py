@@ -73,7 +73,7 @@ def test_the_model_knows_where_it_is_from_and_how_good_it_is(
 ) -> None:
     ball_model.require_backend(attributes)
     assert (ball_model.object_id, ball_model.labels) == ("globe", attributes.labels_for(None))
-    assert ball_model.notes["reference_frames"] == ["globe 0", "globe 1", "globe 2"]
+    assert ball_model.notes["reference_frames"] == [f"frame {k} of globe {k}" for k in range(3)]
     assert ball_model.notes["quality"]["points"] == len(ball_model)
     assert ball_model.notes["quality"]["problems"] == []
     assert ball_model.notes == json.loads(json.dumps(ball_model.notes))

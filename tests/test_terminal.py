@@ -89,6 +89,19 @@ def test_into_a_pipe_goes_no_bar_and_no_control_code(
     assert said == "a table\nerror: an error\n"
 
 
+def test_where_no_bar_can_be_drawn_a_line_now_and_then_tells_how_far_it_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(terminal, "STDERR", Console(stderr=True, force_terminal=False))
+    monkeypatch.setattr(terminal, "LINE_EVERY_S", 0.0)
+    assert list(progress("ab", 2, "looking", lambda: "1 lost")) == ["a", "b"]
+    assert list(progress("c", None, "looking")) == ["c"]
+    assert capsys.readouterr().err == "looking: 1 of 2 1 lost\nlooking: 2 of 2 1 lost\nlooking: 1\n"
+    monkeypatch.setattr(terminal, "LINE_EVERY_S", 3600.0)
+    assert list(progress("ab", 2, "looking")) == ["a", "b"]
+    assert capsys.readouterr().err == ""
+
+
 def test_json_is_one_line_that_can_be_read(capsys: pytest.CaptureFixture[str]) -> None:
     say_json({"a": [1.5, None], "b": "ü\n"})
     said = capsys.readouterr().out

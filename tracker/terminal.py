@@ -6,6 +6,7 @@ import json
 import logging
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
@@ -17,6 +18,7 @@ from tracker.errors import TrackerError
 
 STDERR, ALWAYS = Console(stderr=True), Console(stderr=True)  # ALWAYS is heard where a program is to be quiet
 Item = TypeVar("Item")
+LINE_EVERY_S = 30.0  # where there is no terminal to draw a bar on
 
 
 class Terminated(KeyboardInterrupt):
@@ -61,7 +63,10 @@ def progress(
     items: Iterable[Item], total: int | None, what: str, told: Callable[[], str] = lambda: ""
 ) -> Iterator[Item]:
     """The items, with a bar on the terminal that tells how many of them are done, how fast, how long it takes, and
-    whatever is told after each."""
+    whatever is told after each; elsewhere, as in a log, a line of that every LINE_EVERY_S seconds."""
+    if not STDERR.is_terminal:
+        yield from _told_in_lines(items, total, what, told)
+        return
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -70,12 +75,22 @@ def progress(
         TimeRemainingColumn(),
         TextColumn("{task.fields[told]}", markup=False),
     )
-    with Progress(*columns, console=STDERR, transient=True, disable=not STDERR.is_terminal or STDERR.quiet) as bar:
+    with Progress(*columns, console=STDERR, transient=True, disable=STDERR.quiet) as bar:
         task = bar.add_task(what, total=total, rate="", told="")
         for item in items:
             yield item
             speed = bar.tasks[0].speed
             bar.update(task, advance=1, rate=f"{speed:.1f}/s" if speed else "", told=told())
+
+
+def _told_in_lines(items: Iterable[Item], total: int | None, what: str, told: Callable[[], str]) -> Iterator[Item]:
+    last_s = time.monotonic()
+    for done, item in enumerate(items, start=1):
+        yield item
+        if time.monotonic() - last_s >= LINE_EVERY_S:
+            last_s = time.monotonic()
+            count = f"{done} of {total}" if total is not None else str(done)
+            STDERR.print(f"{what}: {count} {told()}".rstrip(), markup=False, highlight=False)
 
 
 def _plain(text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from typing import Protocol
 
 import cv2
@@ -151,29 +152,31 @@ BACKENDS: dict[str, Callable[[BackendOptions], SaliencyBackend]] = {
     "dinotxt": _dinotxt,
 }
 WITHOUT_WEIGHTS = ("attributes",)
+INSTALLED = "conceptrack.backends"  # entry points of installed packages: NAME = "module:function of BackendOptions"
 
 
 def open_backend(name: str, options: BackendOptions | None = None) -> SaliencyBackend:
     """The backend of this name, or of several: NAME[*WEIGHT]+NAME[*WEIGHT]... asks them together.
 
-    Raises ConfigError that lists those that there are.
+    Raises ConfigError that lists those that there are, ours and those of installed packages.
     """
     options = options or BackendOptions()
     parts = [_part(text, name) for text in name.split("+")]
     if len(parts) == 1 and parts[0][1] == 1:
-        return BACKENDS[parts[0][0]](options)
+        return _opener(parts[0][0])(options)
     if len({part for part, _ in parts}) < len(parts):
         raise ConfigError(f"backend {name!r} has a part twice")
     from tracker.saliency.combined import Combined
 
     bare = BackendOptions(None, options.device)
-    return Combined([(BACKENDS[p](bare if p in WITHOUT_WEIGHTS else options), w) for p, w in parts])
+    return Combined([(_opener(p)(bare if p in WITHOUT_WEIGHTS else options), w) for p, w in parts])
 
 
 def _part(text: str, whole: str) -> tuple[str, float]:
     name, separator, weight = text.partition("*")
-    if name not in BACKENDS:
-        raise ConfigError(f"there is no saliency backend {name!r}; expected one of {', '.join(BACKENDS)}")
+    known = dict.fromkeys((*BACKENDS, *entry_points(group=INSTALLED).names))
+    if name not in known:
+        raise ConfigError(f"there is no saliency backend {name!r}; expected one of {', '.join(known)}")
     try:
         share = float(weight) if separator else 1.0
     except ValueError:
@@ -181,3 +184,14 @@ def _part(text: str, whole: str) -> tuple[str, float]:
     if not 0 < share <= 1:
         raise ConfigError(f"backend {whole!r}: a weight is a number over 0 and up to 1, got {weight!r}")
     return name, share
+
+
+def _opener(name: str) -> Callable[[BackendOptions], SaliencyBackend]:
+    """Only what is installed: a model's file names its backend too, and is not to run code."""
+    if name in BACKENDS:
+        return BACKENDS[name]
+    (entry, *_) = entry_points(group=INSTALLED, name=name)
+    try:
+        return entry.load()
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(f"the package that has backend {name!r} cannot be loaded ({entry.value}: {error})") from error
