@@ -24,7 +24,7 @@ from tracker.sources import Sighting
 from tracker.verification import Evidence
 
 TRUE = np.array([1.5, -0.8, 0.4])  # the last is of the constant
-EVIDENCE = Evidence(0.6, 0.8, 0.7, 0.0, 0.1, 0.0, 0.9, 0.5)
+EVIDENCE = Evidence(0.6, 0.8, 0.7, 0.05, 0.0, 0.1, 0.0, 0.9, 0.5)
 POSE = JudgedPose("away", "away 1", "mug", 3, True, Grounds(EVIDENCE, 0.05, 0.02))
 
 

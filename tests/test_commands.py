@@ -739,11 +739,11 @@ def test_eval_calibrate_fits_to_poses_that_were_kept_and_prints_the_weights(run:
     path, rng = tmp_path / "poses.json", np.random.default_rng(0)
     poses = []
     for index in range(200):
-        colour = rng.random()
-        evidence = Evidence(0.5, 0.5, colour, 0.0, 0.0, 0.0, 1.0, 0.5)
+        contradicted = rng.random()
+        evidence = Evidence(0.5, 0.5, 0.5, contradicted, 0.0, 0.0, 0.0, 1.0, 0.5)
         scene = ("away", "hand")[index % 2]
         name = ("mug", "bowl")[index // 2 % 2]
-        poses.append(JudgedPose(scene, scene, name, index, bool(rng.random() < colour), Grounds(evidence, 0.05)))
+        poses.append(JudgedPose(scene, scene, name, index, bool(rng.random() > contradicted), Grounds(evidence, 0.05)))
     write_poses(path, {}, poses)
     said = run("eval", "calibrate", "--rows", path)
     assert (said.code, said.out) == (0, ""), said.err

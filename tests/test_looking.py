@@ -147,7 +147,7 @@ def test_of_which_hardly_any_surface_is_in_place_is_not_the_likeliest_whatever_i
 ) -> None:
     refined = Refined(can_truth, np.eye(6), np.zeros((0, 6)), 0.0, 100)
     fits = Hypothesis(refined, replace(GOOD, colour=0.7), "search", can_view)
-    hardly = Hypothesis(refined, replace(GOOD, surface=0.19, colour=0.95), "search", can_view)
+    hardly = Hypothesis(refined, replace(GOOD, surface=0.19, colour=0.95, contradicted=0.0), "search", can_view)
     monkeypatch.setattr(Search, "anywhere", lambda *_: [hardly, fits, hardly])
     monkeypatch.setattr(Search, "turned", lambda *_: [])
     found = can_looking([Look(can_frames[0].masks[CAN], None, masked=True)], can_frames[0])
@@ -157,8 +157,9 @@ def test_of_which_hardly_any_surface_is_in_place_is_not_the_likeliest_whatever_i
 
 
 GOOD = Evidence(
-    score=0.6, surface=0.9, colour=0.8, seen_through=0.0, outside=0.0, hidden=0.0, explained=0.9, proved=0.8
-)
+    score=0.6, surface=0.9, colour=0.8, contradicted=0.05, seen_through=0.0, outside=0.0, hidden=0.0, explained=0.9,
+    proved=0.8,
+)  # fmt: skip
 WALL = replace(GOOD, surface=0.78, hidden=0.07, explained=0.6, proved=0.37)  # behind a can's lid
 TABLE = replace(GOOD, surface=0.74, hidden=0.57, explained=0.75, proved=0.33)  # around a can's lid
 CUP = replace(GOOD, explained=0.62, proved=0.66)  # of which the inside is not known

@@ -15,8 +15,8 @@ from tracker.refinement import Refined
 from tracker.symmetry import Symmetry
 from tracker.verification import Evidence
 
-MEASURES = ("colour", "explained", "turn_sigma", "turn", "not_expected", "constant")
-WEIGHTS = np.array([2.79, 1.39, -2.96, -0.46, 1.06, -17.61])
+MEASURES = ("colour", "contradicted", "explained", "turn_sigma", "turn", "not_expected", "constant")
+WEIGHTS = np.array([1.54, -1.63, 0.27, -3.31, -0.76, 0.40, -21.39])
 LEAST_INFORMATION = 1e-6  # of a direction that the data leave free
 LEAST = 0.02  # a share or an angle nearer to 0 than this says no more than this
 
@@ -33,10 +33,10 @@ class Grounds:
 
     def measures(self) -> Floats:
         """(M,) what the confidence is a function of: in the order of `MEASURES`."""
-        colour, explained = _log_odds(self.evidence.colour), _log_odds(self.evidence.explained)
+        shares = (_log_odds(s) for s in (self.evidence.colour, self.evidence.contradicted, self.evidence.explained))
         sigma = np.log(np.clip(self.turn_sigma_rad, 1e-4, 1.0))
         turned = (0.0, 1.0) if self.turn_rad is None else (np.log(LEAST + self.turn_rad), 0.0)
-        return np.array([colour, explained, sigma, *turned, 1.0])
+        return np.array([*shares, sigma, *turned, 1.0])
 
 
 def turn_sigma_rad(refined: Refined, symmetry: Symmetry) -> float:

@@ -18,6 +18,7 @@ from tracker.geometry import Floats, Pose
 from tracker.saliency import Saliency
 from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
+from tracker.verification import LEAST_EXPLAINED
 from tracker.view import ObjectView, view_object
 
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
@@ -96,6 +97,8 @@ def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
     out_of_nowhere = not goes_on and not found.expected
     if seen.surface < LEAST_SURFACE:
         return f"{seen.surface:.0%} of what should be seen is in place"
+    if seen.explained < LEAST_EXPLAINED:
+        return f"{seen.explained:.0%} of what is seen there is explained"
     if out_of_nowhere and seen.hidden > MOST_HIDDEN:
         return f"at the best pose {seen.hidden:.0%} of it would be hidden"
     if out_of_nowhere and seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED:
@@ -193,9 +196,11 @@ class Looking:
 
     def _sure(self, continued: Found) -> bool:
         """Whether concepts could say nothing new, as it is clearly where it was expected. Surface and colours alone let
-        a plain cup slide around its axis until the handle is out of sight."""
+        a plain cup slide around its axis until the handle is out of sight; and what a pose leaves unexplained may be a
+        side that the model does not know, or one that it knows at another pose."""
         steady = continued.grounds.turn_rad is not None and continued.grounds.turn_rad < STEADY_RAD
-        return steady and self._clear(continued) and continued.confidence >= self._config.sure
+        mostly = continued.hypothesis.evidence.explained >= LEAST_ENDS
+        return steady and mostly and self._clear(continued) and continued.confidence >= self._config.sure
 
     def _found(self, hypothesis: Hypothesis, look: Look) -> Found:
         grounds = self._grounds(hypothesis, look.expected)

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
 from tracker.geometry import Pose
+from tracker.lighting import colours_apart
 from tracker.projection import CELL_PX as SELF_HIDDEN_PX
 from tracker.projection import nearest_pixels, not_self_hidden, project
 from tracker.view import ObjectView
@@ -34,7 +35,8 @@ class Evidence:
     """score: in [0, 1], share of the model's surface that should be seen and is, in place and in colour, times what
     `explained` makes it worth: a model need not know all that is seen, but where it knows next to nothing it has proved
     nothing.
-    surface: the same in place alone. colour: agreement of the colours where the place agrees.
+    surface: the same in place alone. colour: agreement of the colours where the place agrees. contradicted: share of
+    the surface in place that has clearly another colour, or where the light would have to be most unusual.
     seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
     outside the mask. hidden: share of the camera-facing model that something in front hides. explained: share of the
     object's measured pixels on which a part of the model lies in place. proved: how much of the model's surface is in
@@ -43,6 +45,7 @@ class Evidence:
     score: float
     surface: float
     colour: float
+    contradicted: float
     seen_through: float
     outside: float
     hidden: float
@@ -56,10 +59,9 @@ class Evidence:
         return self.score / max(worth(self.explained), 1e-9) * float(np.sqrt(self.proved))
 
 
-NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 UNKNOWN, LEAST_EXPLAINED = 0.5, 0.3
-NO_LIGHT = np.array((-16.0, 0.0, 0.0))  # in Lab, where the cube root would be straight on to 0
-GAIN_RANGE, GAIN_SIGMA, OFFSET_SIGMA = (0.5, 2.0), 0.5, 25.0  # of Lab colours
+CONTRADICTS = float(np.exp(-2))  # agreement at two lab_sigma: a colour that agrees less is another
 CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
 
 
@@ -68,7 +70,7 @@ class Verifier:
 
     def __init__(self, model: ConceptModel, config: VerificationConfig, pixels_across: int) -> None:
         self._config, self._diameter_m, self._pixels_across = config, model.diameter_m, pixels_across
-        chosen = np.random.default_rng(0).permutation(len(model))[: config.model_points]
+        chosen = _evenly(model.points, config.model_points)
         self._points, self._normals = model.points[chosen], model.normals[chosen]
         self._lab = model_appearance(model, pixels_across).lab[0][chosen]
         self._most = _most_shown(self._normals)
@@ -94,36 +96,23 @@ class Verifier:
             return NOTHING_SEEN
         in_place = due & on_object & (measured_m > 0) & (np.abs(behind_m) < reach_m)
         surface = weights * in_place * np.exp(-0.5 * (behind_m / self._sigma_m) ** 2)
-        colour = self._colour_agreement(appearance.lab[0][rows, columns], in_place)
+        apart, usual = colours_apart(appearance.lab[0][rows, columns], self._lab, self._normals, in_place)
+        colour = usual * np.exp(-0.5 * (apart / self._config.lab_sigma) ** 2)
+        met = max(float(surface.sum()), 1e-9)
         colour_share = self._config.colour_share
         agreed = float((surface * (1 - colour_share + colour_share * colour)).sum() / total)
         explained = _explained(rows[in_place], columns[in_place], view, round(CELL_PX * finer))
         return Evidence(
             score=agreed * worth(explained),
             surface=float(surface.sum() / total),
-            colour=float((surface * colour).sum() / max(surface.sum(), 1e-9)),
+            colour=float((surface * colour).sum() / met),
+            contradicted=float((surface * (colour < CONTRADICTS)).sum() / met),
             seen_through=float((weights * (on_object & (behind_m > reach_m))).sum() / total),
             outside=float((weights * ~on_object).sum() / total),
             hidden=float((at.facing * hidden).sum() / (at.facing * faces).sum()),
             explained=explained,
             proved=float(weights[in_place].sum() / self._most),
         )
-
-    def _colour_agreement(self, lab: np.ndarray, in_place: np.ndarray) -> np.ndarray:
-        """(N,) in [0, 1]; brightness, and an offset that all points share (white balance), are taken off at a cost.
-
-        Lab is a cube root of light: light that is k times as bright makes (L + 16, a, b) cbrt(k) times as large.
-        """
-        if in_place.sum() < 20:
-            return np.zeros(len(lab))
-        gain = np.median((lab[:, 0] - NO_LIGHT[0])[in_place] / (self._lab[:, 0] - NO_LIGHT[0])[in_place])
-        gain = float(np.clip(gain, *GAIN_RANGE))
-        expected = gain * (self._lab - NO_LIGHT) + NO_LIGHT
-        offset = np.median((lab - expected)[in_place], axis=0)
-        difference = np.linalg.norm((lab - expected - offset) * (0.6, 1, 1), axis=1)
-        drift = np.linalg.norm(offset * (0.3, 1, 1))
-        unlike = (np.log(gain) / GAIN_SIGMA) ** 2 + (drift / OFFSET_SIGMA) ** 2
-        return np.exp(-0.5 * (difference / self._config.lab_sigma) ** 2 - 0.5 * unlike)
 
 
 def worth(explained: float) -> float:
@@ -153,6 +142,17 @@ def _frame_depth_m(points_cam: np.ndarray, view: ObjectView) -> np.ndarray:
     inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
     clipped = (np.where(inside, rows, 0).astype(np.intp), np.where(inside, columns, 0).astype(np.intp))
     return np.where(inside, view.frame.depth_m[clipped], 0.0)
+
+
+def _evenly(points: np.ndarray, most: int) -> np.ndarray:
+    """Indices of up to `most` of the points (N, 3), each the farthest from those before it: sides that were seen from
+    afar have fewer points, and are to count as much."""
+    chosen = np.zeros(min(most, len(points)), np.intp)
+    apart = np.full(len(points), np.inf)
+    for k in range(1, len(chosen)):
+        apart = np.minimum(apart, np.square(points - points[chosen[k - 1]]).sum(axis=1))
+        chosen[k] = apart.argmax()
+    return chosen
 
 
 def _most_shown(normals: np.ndarray) -> float:
