@@ -45,9 +45,8 @@ def test_a_cast_of_colour_is_taken_off_at_a_cost() -> None:
 
 
 def test_brightness_of_another_object_is_not_explained_by_any_light() -> None:
-    apart, usual = colours_apart(np.tile((95.0, 0, 0), (COUNT, 1)), np.tile((5.0, 0, 0), (COUNT, 1)), NORMALS, ALL)
-    assert apart.max() < 1e-6 or usual < 0.5
-    assert usual < 0.5
+    white, black = np.tile((95.0, 0, 0), (COUNT, 1)), np.tile((5.0, 0, 0), (COUNT, 1))
+    assert colours_apart(white, black, NORMALS, ALL)[1] < 0.5
 
 
 def test_only_what_is_known_says_what_the_light_is() -> None:

@@ -164,6 +164,7 @@ WALL = replace(GOOD, surface=0.78, hidden=0.07, explained=0.6, proved=0.37)  # b
 TABLE = replace(GOOD, surface=0.74, hidden=0.57, explained=0.75, proved=0.33)  # around a can's lid
 CUP = replace(GOOD, explained=0.62, proved=0.66)  # of which the inside is not known
 AIR = replace(GOOD, surface=0.1)
+CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
 
 
 @pytest.mark.parametrize(
@@ -172,6 +173,7 @@ AIR = replace(GOOD, surface=0.1)
         (GOOD, 0.15, "masked", ""),
         (GOOD, 0.05, "masked", "right at 5%"),
         (AIR, 0.9, "masked", "10% of what should be seen"),
+        (CORNER, 0.9, "masked", "20% of what is seen there is explained"),
         (WALL, 0.15, "followed", ""),
         (WALL, 0.15, "turned", ""),
         (AIR, 0.9, "followed", "10% of what should be seen"),
