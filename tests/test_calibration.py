@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eval.calibration.collect import collect, pose_is_right
+from eval.calibration.collect import collect, mistaken, pose_is_right
 from eval.calibration.cross_validation import held_out_chances, judge
 from eval.calibration.logistic import chances, fit
 from eval.calibration.report import pasted
@@ -21,6 +21,7 @@ from tracker.confidence import Grounds
 from tracker.errors import ConfigError
 from tracker.geometry import Pose
 from tracker.sources import Sighting
+from tracker.sources.synthetic.things.objects import OBJECTS
 from tracker.verification import Evidence
 
 TRUE = np.array([1.5, -0.8, 0.4])  # the last is of the constant
@@ -140,6 +141,24 @@ def test_poses_of_a_run_are_judged_by_the_truth() -> None:
     assert {(pose.scene, pose.object_id) for pose in poses} == {("away", "tea_box")}
     assert {pose.index % 4 for pose in poses} == {0}
     assert any(pose.right for pose in poses)
+
+
+def test_an_object_is_looked_for_in_the_place_of_another_too_and_where_it_is_not() -> None:
+    runs = calibration_runs(1000, 1, "320x240")
+    strange = [run for run in runs if run.stranger]
+    assert {run.stranger for run in strange} == set(OBJECTS)
+    assert all(run.stranger != run.object_id and run.config.sure < 0.1 for run in strange)
+    assert [run.config.masks for run in runs if run.masks == "mistaken"] == ["given"] * 4
+    masks = {name: np.full((2, 2), k % 2 > 0) for k, name in enumerate(("bowl", "mug", "clamp"))}
+    other = mistaken(masks)
+    assert list(other) == list(masks)
+    assert all((other[a] is masks[b]) for a, b in (("bowl", "mug"), ("mug", "clamp"), ("clamp", "bowl")))
+
+
+def test_nothing_that_is_found_of_an_object_that_is_not_there_is_right() -> None:
+    poses = collect(CalibrationRun("leave", 3, "160x120", 2, every=6, object_id="cereal_box", stranger="tea_box"))
+    assert any(pose.right for pose in poses if pose.object_id == "cereal_box")
+    assert not any(pose.right for pose in poses if pose.object_id == "tea_box")
 
 
 def test_right_is_near_and_in_sight() -> None:

@@ -14,7 +14,7 @@ from tracker.config import TrackerConfig
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.sources.synthetic import SyntheticScene
-from tracker.verification import Evidence, VerificationConfig, Verifier, worth
+from tracker.verification import Evidence, VerificationConfig, Verifier, evenly, worth
 from tracker.view import ObjectView, ViewConfig, view_object
 
 CONFIG = VerificationConfig()
@@ -220,3 +220,17 @@ def test_a_finer_view_explains_as_much(can_model: ConceptModel, can_frames: list
     ]
     coarse, fine = (Verifier(can_model, CONFIG, 32)(can_truth, v, view_appearance(v)) for v in views if v is not None)
     assert fine.explained > 0.9 * coarse.explained > 0.8
+
+
+def test_points_are_spread_evenly_however_densely_a_side_was_seen() -> None:
+    rng = np.random.default_rng(3)
+    dense, sparse = rng.random((20_000, 3)) * (1, 1, 0), rng.random((2000, 3)) * (1, 1, 0) + (1, 0, 0)
+    points = np.concatenate((dense, sparse))
+    chosen = evenly(points, 400)
+    assert len(set(chosen)) == 400
+    assert np.count_nonzero(chosen >= len(dense)) == pytest.approx(200, abs=20)
+    assert sorted(evenly(points[:50], 400)) == list(range(50))
+
+
+def test_points_that_lie_on_one_another_are_all_taken_where_so_many_are_wanted() -> None:
+    assert len(evenly(np.zeros((5, 3)), 5)) == 5

@@ -70,7 +70,7 @@ class Verifier:
 
     def __init__(self, model: ConceptModel, config: VerificationConfig, pixels_across: int) -> None:
         self._config, self._diameter_m, self._pixels_across = config, model.diameter_m, pixels_across
-        chosen = _evenly(model.points, config.model_points)
+        chosen = evenly(model.points, config.model_points)
         self._points, self._normals = model.points[chosen], model.normals[chosen]
         self._lab = model_appearance(model, pixels_across).lab[0][chosen]
         self._most = _most_shown(self._normals)
@@ -144,7 +144,7 @@ def _frame_depth_m(points_cam: np.ndarray, view: ObjectView) -> np.ndarray:
     return np.where(inside, view.frame.depth_m[clipped], 0.0)
 
 
-def _evenly(points: np.ndarray, most: int) -> np.ndarray:
+def evenly(points: np.ndarray, most: int) -> np.ndarray:
     """Indices of up to `most` of the points (N, 3), each the farthest from those before it: sides that were seen from
     afar have fewer points, and are to count as much."""
     chosen = np.zeros(min(most, len(points)), np.intp)

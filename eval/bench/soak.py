@@ -75,12 +75,12 @@ class SoakBench:
         models = [onboard(read_reference_frames(scene, object_id, VIEWS), backend) for object_id in object_ids]
         tracker = ObjectTracker(models, TrackerConfig(masks="carried"), backend)
         spent_ms: list[float] = []
-        resident_mb, tracked = [], 0
+        memory_mb, tracked = [], 0
         for frame in progress(_forth_and_back(list(scene), self.frames), self.frames, "frames"):
             start_s = time.perf_counter()
             results = tracker.step(frame)
             spent_ms.append((time.perf_counter() - start_s) * 1e3)
-            resident_mb.append(_resident_mb())
+            memory_mb.append(resident_mb())
             tracked += sum(result.pose is not None for result in results)
         early, late = spent_ms[self.settled : 2 * self.settled], spent_ms[-self.settled :]
         return {
@@ -88,8 +88,8 @@ class SoakBench:
             "median_ms": statistics.median(spent_ms),
             "p95_ms": statistics.quantiles(spent_ms, n=20)[-1],
             "slowdown": statistics.median(late) / statistics.median(early),
-            "resident_mb": [resident_mb[self.settled], resident_mb[-1]],
-            "growth": max(resident_mb[self.settled :]) / resident_mb[self.settled] - 1,
+            "resident_mb": [memory_mb[self.settled], memory_mb[-1]],
+            "growth": max(memory_mb[self.settled :]) / memory_mb[self.settled] - 1,
             "tracked": tracked / (self.frames * len(models)),
             "settings": {"frames": self.frames, "objects": list(object_ids), "size": self.size},
         }
@@ -103,5 +103,6 @@ def _forth_and_back(rendered: Sequence[Frame], count: int) -> Iterator[Frame]:
         yield replace(frame, index=index, stamp_ns=index * 10**9 // RATE_HZ, masks=masks)
 
 
-def _resident_mb() -> float:
+def resident_mb() -> float:
+    """Memory of this process."""
     return int(STATM.read_text().split()[1]) * resource.getpagesize() / 2**20

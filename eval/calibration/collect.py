@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
+from dataclasses import replace
 
 from eval.calibration.rows import JudgedPose
 from eval.calibration.runs import CalibrationRun
@@ -18,6 +20,7 @@ from reference.onboard import onboard, read_reference_frames
 from tracker.concept import ConceptModel
 from tracker.errors import OnboardingError
 from tracker.first_masks import FirstMasks
+from tracker.frame import Mask
 from tracker.geometry import Pose
 from tracker.pipeline import ObjectTracker
 from tracker.saliency import BackendOptions
@@ -39,17 +42,23 @@ def collect(run: CalibrationRun) -> list[JudgedPose]:
         if not models:
             return []
         dataset = SyntheticDataset(scene)
-        symmetries = {model.object_id: dataset.model(model.object_id).symmetries for model in models}
+        symmetries = {name: dataset.model(name).symmetries for name in scene.object_ids}
+        if run.stranger:
+            models.append(clean_model(run.stranger, run.seed, run.size, run.views))
         tracker = ObjectTracker(models, run.config, opened_backend(BACKEND, BackendOptions()))
         first_masks = FirstMasks()
         poses = []
         for index in range(0, len(scene), run.every):
             frame = scene[index]
+            if run.masks == "mistaken":
+                frame = replace(frame, masks=mistaken(frame.masks))
             for result in tracker.step(first_masks(frame) if run.masks == "carried" else frame):
                 name = result.object_id
                 if result.pose is None or result.grounds is None or (index, name) in known:
                     continue
-                right = pose_is_right(result.pose, scene.sightings(name)[index], symmetries[name])
+                right = name != run.stranger and pose_is_right(
+                    result.pose, scene.sightings(name)[index], symmetries[name]
+                )
                 poses.append(JudgedPose(run.scene, run.name, name, index, right, result.grounds))
     return poses
 
@@ -73,6 +82,12 @@ def _models(run: CalibrationRun, scene: SyntheticScene) -> tuple[list[ConceptMod
         except OnboardingError as error:
             log.warning("%s: %s", run.name, error)
     return models, known
+
+
+def mistaken(masks: Mapping[str, Mask]) -> dict[str, Mask]:
+    """Each object has the mask of the one after it."""
+    names = list(masks)
+    return {name: masks[other] for name, other in zip(names, names[1:] + names[:1], strict=True)}
 
 
 def pose_is_right(pose: Pose, sighting: Sighting, symmetries: ObjectSymmetries) -> bool:
