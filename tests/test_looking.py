@@ -164,6 +164,7 @@ WALL = replace(GOOD, surface=0.78, hidden=0.07, explained=0.6, proved=0.37)  # b
 TABLE = replace(GOOD, surface=0.74, hidden=0.57, explained=0.75, proved=0.33)  # around a can's lid
 CUP = replace(GOOD, explained=0.62, proved=0.66)  # of which the inside is not known
 AIR = replace(GOOD, surface=0.1)
+ALIKE = replace(GOOD, contradicted=0.22)  # another box of that size
 CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
 
 
@@ -187,6 +188,9 @@ CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
         (WALL, 0.8, "anywhere", "goes on beyond it"),
         (WALL, 0.35, "expected", ""),  # most of it may be hidden, but there it is likely
         (TABLE, 0.8, "anywhere", "57% of it would be hidden"),
+        (ALIKE, 0.95, "anywhere", "22% of what is in place has another colour"),
+        (ALIKE, 0.95, "expected", ""),  # light that changes makes other colours of the object's own
+        (ALIKE, 0.95, "masked", ""),
     ],
 )
 def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
