@@ -165,6 +165,7 @@ TABLE = replace(GOOD, surface=0.74, hidden=0.57, explained=0.75, proved=0.33)  #
 CUP = replace(GOOD, explained=0.62, proved=0.66)  # of which the inside is not known
 AIR = replace(GOOD, surface=0.1)
 ALIKE = replace(GOOD, contradicted=0.22)  # another box of that size
+GLASS = replace(GOOD, seen_through=0.2)
 CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
 
 
@@ -175,6 +176,8 @@ CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
         (GOOD, 0.05, "masked", "right at 5%"),
         (AIR, 0.9, "masked", "10% of what should be seen"),
         (CORNER, 0.9, "masked", "20% of what is seen there is explained"),
+        (GLASS, 0.9, "masked", "20% of what should be seen is seen through"),
+        (GLASS, 0.9, "followed", "20% of what should be seen is seen through"),
         (WALL, 0.15, "followed", ""),
         (WALL, 0.15, "turned", ""),
         (AIR, 0.9, "followed", "10% of what should be seen"),
@@ -189,7 +192,8 @@ CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
         (WALL, 0.35, "expected", ""),  # most of it may be hidden, but there it is likely
         (TABLE, 0.8, "anywhere", "57% of it would be hidden"),
         (ALIKE, 0.95, "anywhere", "22% of what is in place has another colour"),
-        (ALIKE, 0.95, "expected", ""),  # light that changes makes other colours of the object's own
+        (ALIKE, 0.95, "expected", "22% of what is in place has another colour"),
+        (ALIKE, 0.95, "followed", ""),  # light that changes makes other colours of the object's own
         (ALIKE, 0.95, "masked", ""),
     ],
 )

@@ -22,6 +22,7 @@ from tracker.verification import LEAST_EXPLAINED
 from tracker.view import ObjectView, view_object
 
 LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
+MOST_SEEN_THROUGH = 0.1  # of what should be seen: of right poses in rendered scenes one of a hundred has over 0.01
 MOST_TRIED = 64  # poses that are remembered
 # What is seen where nothing was expected has to end where its outline does or to show much of itself, and most of what
 # faces the camera has to be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
@@ -102,7 +103,9 @@ def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
         return f"{seen.surface:.0%} of what should be seen is in place"
     if seen.explained < LEAST_EXPLAINED:
         return f"{seen.explained:.0%} of what is seen there is explained"
-    if out_of_nowhere and seen.contradicted > MOST_CONTRADICTED:
+    if seen.seen_through > MOST_SEEN_THROUGH:
+        return f"{seen.seen_through:.0%} of what should be seen is seen through"
+    if not goes_on and seen.contradicted > MOST_CONTRADICTED:
         return f"{seen.contradicted:.0%} of what is in place has another colour"
     if out_of_nowhere and seen.hidden > MOST_HIDDEN:
         return f"at the best pose {seen.hidden:.0%} of it would be hidden"
