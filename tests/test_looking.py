@@ -112,6 +112,17 @@ def test_concepts_are_asked_for_where_surface_and_colours_do_not_lead_to_it(
     assert can_looking.asked == 1
 
 
+def test_where_concepts_lead_astray_what_surface_and_colours_lead_to_is_kept(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a surprising turn, so that they were asked."""
+    monkeypatch.setattr(Search, "near", lambda *_: [])
+    monkeypatch.setattr(Search, "anywhere", lambda *_: [])
+    tilted = can_truth.nudged(np.array((0.12, 0.04, 0, 0, 0, 0)))
+    assert_at(can_looking([Look(can_frames[0].masks[CAN], tilted, (tilted,), masked=True)], can_frames[0]), can_truth)
+    assert can_looking.asked == 1
+
+
 def test_what_is_far_from_where_it_was_expected_is_less_likely(
     can_looking: Counted, can_frames: list[Frame], can_truth: Pose
 ) -> None:
