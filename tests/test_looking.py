@@ -149,6 +149,17 @@ def test_what_is_found_about_where_somebody_pointed_was_expected_there(
     assert found.grounds.turn_rad is None  # a place has no pose that another could be turned from
 
 
+@pytest.mark.parametrize(("off_m", "expected"), [(0.02, True), (0.4, False)])
+def test_what_is_found_farther_than_its_own_size_from_where_it_was_expected_was_not_expected_there(
+    off_m: float, expected: bool, can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    there = can_truth.nudged(np.array((0, 0, 0, off_m, 0, 0)))
+    found = can_looking([Look(can_frames[0].masks[CAN], None, (there,))], can_frames[0])
+    assert isinstance(found, Found)
+    assert found.expected == expected
+    assert found.grounds.turn_rad == pytest.approx(0.0, abs=0.05)
+
+
 def test_of_which_hardly_any_surface_is_in_place_is_not_the_likeliest_whatever_its_colours(
     can_looking: Counted,
     can_frames: list[Frame],

@@ -215,10 +215,10 @@ class Looking:
         return found
 
     def _expects(self, look: Look, hypothesis: Hypothesis) -> bool:
-        if look.place_m is None:
-            return bool(look.expected)
-        centre_m = (hypothesis.refined.T_cam_obj @ self._centre_m[None])[0]
-        return float(np.linalg.norm(centre_m - look.place_m)) < self._model.diameter_m
+        """Whether it is no farther than its own size from a place where it was expected, or is said to be."""
+        places_m = [pose @ self._centre_m[None] for pose in look.expected] if look.place_m is None else [look.place_m]
+        centre_m = hypothesis.refined.T_cam_obj @ self._centre_m[None]
+        return any(float(np.linalg.norm(centre_m - place_m)) < self._model.diameter_m for place_m in places_m)
 
     def _grounds(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> Grounds:
         refined, symmetry = hypothesis.refined, self._model.symmetry
