@@ -51,12 +51,12 @@ class SiftConfig(BaseModel):
     iterations: int = Field(default=20_000, ge=1)
     confidence: float = Field(default=0.999, gt=0, le=1)
     edge_similarity: float = Field(default=0.8, ge=0, le=1)
-    least_matches: int = Field(default=4, ge=3)
-    least_inliers: int = Field(default=4, ge=3)
+    least_matches: int = Field(default=3, ge=3)
+    least_inliers: int = Field(default=3, ge=3)
     icp_steps: int = Field(default=8, ge=0)
     icp_reach_start: float = Field(default=0.06, gt=0)
     icp_reach_end: float = Field(default=0.025, gt=0)
-    least_fitness: float = Field(default=0.4, ge=0, le=1)
+    least_fitness: float = Field(default=0.1, ge=0, le=1)
     lying: float = Field(default=0.02, ge=0, le=1)
     seed: int = 0
 
