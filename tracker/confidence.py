@@ -15,8 +15,8 @@ from tracker.refinement import Refined
 from tracker.symmetry import Symmetry
 from tracker.verification import Evidence
 
-# Fitted before `contradicted` counted unusual light. On poses found after that: AUROC 0.98, calibration error 0.01 (of
-# 5755). A fit to those counts colour for less, and took other things for the object where masks were carried in clutter.
+# Fitted before `contradicted` counted unusual light. On poses found after that: AUROC 0.98, calibration error 0.01.
+# A fit to those counts colour for less, and took other things for the object where masks were carried in clutter.
 MEASURES = ("colour", "contradicted", "explained", "turn_sigma", "turn", "not_expected", "constant")
 WEIGHTS = np.array([1.54, -1.63, 0.27, -3.31, -0.76, 0.40, -21.39])
 LEAST_INFORMATION = 1e-6  # of a direction that the data leave free

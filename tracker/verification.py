@@ -18,8 +18,9 @@ from tracker.view import ObjectView
 
 class VerificationConfig(BaseModel):
     """model_points: how many are looked at. depth_sigma: distance at which a surface still agrees, as a share of the
-    diameter, at least depth_sigma_least_m. lab_sigma: colour difference at which it still agrees. colour_share: share
-    of the score that colour decides; geometry decides the rest."""
+    diameter, at least depth_sigma_least_m. lab_sigma: colour difference at which it still agrees. colour_share: how
+    much colour decides of the score, its exponent: at 0 geometry decides alone, at 1 another colour is worth as little
+    as another place."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -99,8 +100,7 @@ class Verifier:
         apart, usual = colours_apart(appearance.lab[0][rows, columns], self._lab, self._normals, in_place)
         colour = usual * np.exp(-0.5 * (apart / self._config.lab_sigma) ** 2)
         met = max(float(surface.sum()), 1e-9)
-        colour_share = self._config.colour_share
-        agreed = float((surface * (1 - colour_share + colour_share * colour)).sum() / total)
+        agreed = float((surface * colour**self._config.colour_share).sum() / total)
         explained = _explained(rows[in_place], columns[in_place], view, round(CELL_PX * finer))
         return Evidence(
             score=agreed * worth(explained),
