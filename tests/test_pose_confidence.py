@@ -13,7 +13,7 @@ from tracker.refinement import Refined
 from tracker.symmetry import NO_SYMMETRY, Symmetry
 from tracker.verification import NOTHING_SEEN
 
-FAIR = Grounds(replace(NOTHING_SEEN, colour=0.6, contradicted=0.1, explained=0.7), turn_sigma_rad=0.005, turn_rad=0.05)
+FAIR = Grounds(replace(NOTHING_SEEN, colour=0.6, contradicted=0.1, explained=0.7), turn_sigma_rad=0.02, turn_rad=0.05)
 ROUND = Symmetry.generated([], np.zeros(3), np.array((0.0, 0.0, 1.0)))
 
 
@@ -26,7 +26,7 @@ def test_a_measure_has_a_weight_and_a_name() -> None:
     assert confidence(FAIR) == pytest.approx(1 / (1 + np.exp(-FAIR.measures() @ WEIGHTS)))
 
 
-@pytest.mark.parametrize("share", ["contradicted", "explained"])
+@pytest.mark.parametrize("share", ["colour", "contradicted", "explained"])
 def test_more_that_agrees_makes_it_likelier(share: str) -> None:
     shares = np.linspace(0, 1, 11)
     stated = [
