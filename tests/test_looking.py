@@ -10,9 +10,10 @@ import pytest
 from tracker.concept import ConceptModel
 from tracker.confidence import Grounds, confidence
 from tracker.config import TrackerConfig
+from tracker.found import Found, Look
 from tracker.frame import Frame
 from tracker.geometry import Pose
-from tracker.looking import Found, Look, Looking, believed, doubt
+from tracker.looking import Looking
 from tracker.refinement import Refined
 from tracker.saliency import Query, SaliencyBackend
 from tracker.search import Hypothesis, Search
@@ -138,6 +139,16 @@ def test_what_is_far_from_where_it_was_expected_is_less_likely(
     assert surprising.grounds.turn_rad == pytest.approx(1.0, abs=0.1)
 
 
+def test_the_nearest_of_expected_poses_at_one_place_is_the_one_that_is_turned_least(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    turned = can_truth.nudged(np.array((0, 0, 1.0, 0, 0, 0)))
+    shifted = can_truth.nudged(np.array((0, 0, 0, 0.004, 0, 0)))
+    found = can_looking([Look(can_frames[0].masks[CAN], None, (turned, shifted), masked=True)], can_frames[0])
+    assert isinstance(found, Found)
+    assert found.grounds.turn_rad == pytest.approx(0, abs=0.05)
+
+
 @pytest.mark.parametrize(("off_m", "expected"), [(0.02, True), (0.4, False)])
 def test_what_is_found_about_where_somebody_pointed_was_expected_there(
     off_m: float, expected: bool, can_looking: Counted, can_frames: list[Frame], can_truth: Pose
@@ -160,6 +171,12 @@ def test_what_is_found_farther_than_its_own_size_from_where_it_was_expected_was_
     assert found.grounds.turn_rad == pytest.approx(0.0, abs=0.05)
 
 
+GOOD = Evidence(
+    score=0.6, surface=0.9, colour=0.8, contradicted=0.05, seen_through=0.0, outside=0.0, hidden=0.0, explained=0.9,
+    proved=0.8,
+)  # fmt: skip
+
+
 def test_of_which_hardly_any_surface_is_in_place_is_not_the_likeliest_whatever_its_colours(
     can_looking: Counted,
     can_frames: list[Frame],
@@ -178,64 +195,21 @@ def test_of_which_hardly_any_surface_is_in_place_is_not_the_likeliest_whatever_i
     assert confidence(Grounds(hardly.evidence, 0.01)) > confidence(Grounds(fits.evidence, 0.01))
 
 
-GOOD = Evidence(
-    score=0.6, surface=0.9, colour=0.8, contradicted=0.05, seen_through=0.0, outside=0.0, hidden=0.0, explained=0.9,
-    proved=0.8,
-)  # fmt: skip
-WALL = replace(GOOD, surface=0.78, hidden=0.07, explained=0.6, proved=0.37)  # behind a can's lid
-TABLE = replace(GOOD, surface=0.74, hidden=0.57, explained=0.75, proved=0.33)  # around a can's lid
-CUP = replace(GOOD, explained=0.62, proved=0.66)  # of which the inside is not known
-AIR = replace(GOOD, surface=0.1)
-ALIKE = replace(GOOD, contradicted=0.22)  # another box of that size
-GLASS = replace(GOOD, seen_through=0.2)
-CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
-
-
 @pytest.mark.parametrize(
-    ("evidence", "confidence", "how", "said"),
-    [
-        (GOOD, 0.15, "masked", ""),
-        (GOOD, 0.05, "masked", "right at 5%"),
-        (AIR, 0.9, "masked", "10% of what should be seen"),
-        (CORNER, 0.9, "masked", "20% of what is seen there is explained"),
-        (GLASS, 0.9, "masked", "20% of what should be seen is seen through"),
-        (GLASS, 0.9, "followed", "20% of what should be seen is seen through"),
-        (WALL, 0.15, "followed", ""),
-        (WALL, 0.15, "turned", ""),
-        (AIR, 0.9, "followed", "10% of what should be seen"),
-        (GOOD, 0.35, "jumped", ""),
-        (GOOD, 0.25, "jumped", "right at 25%"),
-        (GOOD, 0.35, "expected", ""),
-        (GOOD, 0.25, "expected", "right at 25%"),
-        (GOOD, 0.55, "anywhere", ""),
-        (GOOD, 0.45, "anywhere", "right at 45%"),
-        (CUP, 0.55, "anywhere", ""),
-        (WALL, 0.8, "anywhere", "goes on beyond it"),
-        (WALL, 0.35, "expected", ""),  # most of it may be hidden, but there it is likely
-        (TABLE, 0.8, "anywhere", "57% of it would be hidden"),
-        (ALIKE, 0.95, "anywhere", "22% of what is in place has another colour"),
-        (ALIKE, 0.95, "expected", "22% of what is in place has another colour"),
-        (ALIKE, 0.95, "followed", ""),  # light that changes makes other colours of the object's own
-        (ALIKE, 0.95, "masked", ""),
-    ],
+    ("turn_rad", "shift_m", "score", "is_rival"),
+    [(0.8, 0.0, 0.7, True), (0.8, 0.0, 0.63, False), (0.1, 0.0, 0.7, False), (0.8, 0.3, 0.7, False)],
 )
-def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
-    evidence: Evidence, confidence: float, how: str, said: str, can_view: ObjectView
+def test_what_explains_clearly_more_and_is_turned_otherwise_is_a_rival(
+    turn_rad: float, shift_m: float, score: float, is_rival: bool, can_model: ConceptModel, can_view: ObjectView
 ) -> None:
-    origin = {"followed": "prediction", "turned": "turn"}.get(how, "search")
-    refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
-    grounds = Grounds(evidence, 0.01, None if how == "anywhere" else 0.02)
-    expected, masked = how != "anywhere", how == "masked"
-    found = Found(Hypothesis(refined, evidence, origin, can_view), grounds, confidence, expected, masked)
-    followed, config = how in ("followed", "turned", "jumped"), TrackerConfig()
-    assert believed(found, followed, config) == (not said)
-    assert said in doubt(found, followed, config)
-    assert bool(doubt(found, followed, config)) == bool(said)
+    def found(pose: Pose, evidence: Evidence) -> Found:
+        refined = Refined(pose, np.eye(6), np.zeros((0, 6)), 0.0, 100)
+        hypothesis = Hypothesis(refined, evidence, "turn", can_view)
+        return Found(hypothesis, Grounds(evidence, 0.01), 0.9, expected=True, masked=False)
 
-
-def test_what_did_not_even_show_at_the_first_place_is_said_for_that(can_view: ObjectView) -> None:
-    refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
-    hypothesis = Hypothesis(refined, AIR, "search", can_view)
-    found = Found(hypothesis, Grounds(AIR, 0.01), 0.9, expected=False, masked=False, missed="hidden")
-    assert doubt(found, False, TrackerConfig()) == "hidden"
-    assert doubt("out of view", True, TrackerConfig()) == "out of view"
+    looking, pose = Looking(can_model, TrackerConfig()), Pose(np.eye(3), np.array((0, 0, 0.7)))
+    astray = found(pose, GOOD)
+    other = found(pose.nudged(np.array((turn_rad, 0, 0, shift_m, 0, 0))), replace(GOOD, score=score))
+    looking.tried.extend((astray, other))
+    assert looking.rival(astray) == (other.hypothesis.refined.T_cam_obj if is_rival else None)
+    assert looking.rival(other) is None

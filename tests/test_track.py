@@ -13,8 +13,10 @@ from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError
 from tracker.first_masks import FirstMasks
+from tracker.found import Look
 from tracker.frame import Frame
 from tracker.geometry import Pose
+from tracker.looking import Looking
 from tracker.pipeline import ObjectTracker
 from tracker.pointing import Click, Pointer
 from tracker.result import TrackResult, TrackState
@@ -49,6 +51,23 @@ def test_a_can_is_followed_by_its_first_mask_alone(
     for frame, result in zip(can_frames, carried(can_model, can_frames), strict=True):
         assert result.state is TrackState.TRACKING, result.reason
         assert_near(result.pose, can_scene.sightings(CAN)[frame.index].T_cam_obj)
+
+
+@pytest.mark.parametrize("prior", [True, False])
+def test_a_rival_is_compared_in_the_next_frame_where_there_is_a_prior(
+    prior: bool, can_model: ConceptModel, can_frames: list[Frame], can_truth: Pose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tracker = ObjectTracker(can_model, TrackerConfig(prior=prior))
+    tracker.step(can_frames[0])
+    turned = can_truth.nudged(np.array((0.0, 0.6, 0, 0, 0, 0)))
+    monkeypatch.setattr(Looking, "rival", lambda *_: turned)
+    tracker.step(can_frames[1])
+    monkeypatch.undo()
+    (result,) = tracker.step(can_frames[2])
+    assert result.pose is not None
+    assert result.pose.distance_to_m(can_truth) < 0.05
+    starts = [look.start for look in tracker.attempt(CAN).looks if isinstance(look, Look)]
+    assert len([start for start in starts if start is not None]) == (2 if prior else 0)
 
 
 @pytest.fixture(scope="module")

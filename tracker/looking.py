@@ -4,115 +4,32 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeGuard, TypeVar
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
+from tracker.belief import LEAST_ENDS, LEAST_SURFACE
 from tracker.cloud import LEAST_POINTS, lift
 from tracker.concept import ConceptModel
 from tracker.confidence import Grounds, confidence, turn_sigma_rad
 from tracker.config import TrackerConfig
+from tracker.found import Found, Look
 from tracker.frame import Frame, Mask
-from tracker.geometry import Floats, Pose
+from tracker.geometry import Pose
 from tracker.saliency import Saliency
 from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
-from tracker.verification import LEAST_EXPLAINED
 from tracker.view import ObjectView, view_object
 
-LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
-MOST_SEEN_THROUGH = 0.1  # of what should be seen: of right poses in rendered scenes one of a hundred has over 0.01
 MOST_TRIED = 64  # poses that are remembered
-# What is seen where nothing was expected has to end where its outline does or to show much of itself, and most of what
-# faces the camera has to be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
-LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
-# A look-alike may fit as exactly as the object itself, which a confidence is the higher for; of right poses that are
-# found out of nowhere in rendered scenes one of a hundred has more than half of this in another colour.
-MOST_CONTRADICTED = 0.15
 STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
+CLEARLY_MORE = 0.05  # has a rival to explain: the evidence of one pose differs less by what moves it a bit
+TURNED_RAD = 0.175  # a pose farther than this from a right one is wrong
 
 T = TypeVar("T")
 # Asks for the saliency of a view, as often as it takes; is given None where that is not to be had now.
 Asking = Generator[ObjectView, Saliency | None, T]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Look:
-    """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. expected:
-    all poses that the object was expected at. place_m: (3,) camera coordinates, where somebody said that it is, though
-    no pose could be told there. masked: the pixels are known to be the object's; then it is looked for in any pose too,
-    where it is not clearly near the start. contested: the next look is to be compared with it, however clear it is."""
-
-    mask: Mask
-    start: Pose | None
-    expected: Sequence[Pose] = ()
-    place_m: Floats | None = None
-    masked: bool = False
-    contested: bool = False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """A pose, and what speaks for it. expected: it was about there, or somebody said that it is. masked: by pixels that
-    are known to be the object's. missed: why it did not even show at the first place where it was looked for; empty
-    where something did. saliency: what concepts said there, None where surface and colours were enough."""
-
-    hypothesis: Hypothesis
-    grounds: Grounds
-    confidence: float
-    expected: bool
-    masked: bool
-    missed: str = ""
-    saliency: Saliency | None = None
-
-    @property
-    def score(self) -> float:
-        return self.hypothesis.evidence.score
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Attempt:
-    """How one object was looked for in a frame. looks: where, one after the other, or why nowhere. tried: the poses
-    that were found and judged, there and in the whole picture."""
-
-    looks: tuple[Look | str, ...]
-    tried: tuple[Found, ...]
-
-
-def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeGuard[Found]:
-    """Whether `doubt` has nothing to say."""
-    return not doubt(found, followed, config)
-
-
-def doubt(found: Found | str, followed: bool, config: TrackerConfig) -> str:
-    """Why it is not believed, in words; empty where it is."""
-    if isinstance(found, str):
-        return found
-    lacking = _lacking(found, followed, config)
-    return lacking and (found.missed or f"poor fit: {lacking}")
-
-
-def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
-    """What a pose lacks. It has to be likely. Where nobody says which pixels are the object's, less is asked where it
-    was expected while it is followed than of what is seen again near there or has jumped, so that a state does not
-    flicker; and most where nothing was expected."""
-    seen, goes_on = found.hypothesis.evidence, found.masked or (followed and found.hypothesis.origin != "search")
-    out_of_nowhere = not goes_on and not found.expected
-    if seen.surface < LEAST_SURFACE:
-        return f"{seen.surface:.0%} of what should be seen is in place"
-    if seen.explained < LEAST_EXPLAINED:
-        return f"{seen.explained:.0%} of what is seen there is explained"
-    if seen.seen_through > MOST_SEEN_THROUGH:
-        return f"{seen.seen_through:.0%} of what should be seen is seen through"
-    if not goes_on and seen.contradicted > MOST_CONTRADICTED:
-        return f"{seen.contradicted:.0%} of what is in place has another colour"
-    if out_of_nowhere and seen.hidden > MOST_HIDDEN:
-        return f"at the best pose {seen.hidden:.0%} of it would be hidden"
-    if out_of_nowhere and seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED:
-        return "what is seen at the best pose goes on beyond it"
-    least = config.believe if goes_on else config.sure if out_of_nowhere else config.regain
-    return "" if found.confidence >= least else f"the best pose is right at {found.confidence:.0%}"
 
 
 class Looking:
@@ -151,6 +68,15 @@ class Looking:
         """Somebody else has done so."""
         self._without_concepts = 0
 
+    def rival(self, found: Found) -> Pose | None:
+        """T_cam_obj of what was tried in this frame about there, is turned otherwise, explains clearly more of it than
+        what was found, and was thought less likely for being unexpected alone. What is found may have turned astray."""
+        pose = found.hypothesis.refined.T_cam_obj
+        best = max(self.tried, key=lambda tried: tried.explains, default=found)
+        other = self._model.symmetry.nearest(best.hypothesis.refined.T_cam_obj, pose)
+        turned = other.angle_to_rad(pose) > TURNED_RAD and other.distance_to_m(pose) < self._model.diameter_m / 4
+        return other if turned and best.explains > found.explains + CLEARLY_MORE else None
+
     def outline(self, T_cam_obj: Pose, frame: Frame, clock: Stopwatch) -> Mask | str:
         """See `Search.outline`."""
         with clock("mask"):
@@ -176,7 +102,7 @@ class Looking:
         with clock("cloud"):
             cloud = lift(view, saliency, self._config.cloud)
         if len(cloud) < LEAST_POINTS:
-            return f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
+            return best or f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
         if look.start is not None:
             best = self._likeliest(best, self._search.near(look.start, sight, cloud, clock), look)
         if look.start is None or (look.masked and (best is None or best.score < self._config.trust)):
@@ -226,5 +152,6 @@ class Looking:
         if not expected:
             return grounds
         pose = refined.T_cam_obj
-        nearest = min(expected, key=pose.distance_to_m)
-        return replace(grounds, turn_rad=symmetry.nearest(pose, nearest).angle_to_rad(nearest))
+        turns_rad = [symmetry.nearest(pose, other).angle_to_rad(other) for other in expected]
+        moved_m = [pose.distance_to_m(other) for other in expected] + np.array(turns_rad) * self._model.diameter_m / 2
+        return replace(grounds, turn_rad=turns_rad[moved_m.argmin()])

@@ -10,10 +10,10 @@ from tracker.claims import claimed_by_others, in_one_place
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError, FrameError, LateFrameError
+from tracker.found import Attempt
 from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.lockstep import lockstep
-from tracker.looking import Attempt
 from tracker.places import Moment
 from tracker.pointing import Pointer
 from tracker.result import TrackResult

@@ -9,9 +9,10 @@ from itertools import chain
 from tracker.camera_motion import CameraMotion, Landmarks
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
+from tracker.found import Found, Look
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
-from tracker.looking import Asking, Found, Look, Looking
+from tracker.looking import Asking, Looking
 from tracker.pointing import Pointer
 from tracker.proposals import Proposals
 from tracker.stopwatch import Stopwatch

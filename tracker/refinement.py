@@ -20,7 +20,6 @@ from tracker.symmetry import Symmetry
 from tracker.view import Float32s, ObjectView
 
 LEAST_POINTS = 20  # fewer do not carry six degrees of freedom
-COARSE_POINTS = 1500  # at most, while colours are smoothed: there more of them say the same again
 FACING_LEAST = 0.15  # cosine: more grazing surfaces have no depth and no colour worth using
 PLAIN_VARIANCE = 20.0  # squared Lab units: a surface of less contrast than this has no gain to be seen
 GAIN_RANGE = (0.6, 1.6)
@@ -73,8 +72,7 @@ class Refined:
 class _Linearised:
     matrix: Floats
     vector: Floats
-    residual_m: float
-    aligned: int
+    residuals_m: Floats
 
 
 class Refiner:
@@ -103,13 +101,13 @@ class Refiner:
         if linear is None:
             return None
         free = free_directions(linear.matrix, self._radius_m)
-        return Refined(T_cam_obj, linear.matrix, free, linear.residual_m, linear.aligned)
+        residual_m = float(np.median(np.abs(linear.residuals_m)))
+        return Refined(T_cam_obj, linear.matrix, free, residual_m, len(linear.residuals_m))
 
     def _linearise(
         self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance, sigma_m: float, level: int
     ) -> _Linearised | None:
-        count = COARSE_POINTS if level else len(self._points)
-        at = project(self._points[:count], self._normals[:count], T_cam_obj, view.camera)
+        at = project(self._points, self._normals, T_cam_obj, view.camera)
         usable = np.flatnonzero(at.within(view.camera, 2) & (at.facing > FACING_LEAST))
         rows, columns = (pixels[usable] for pixels in nearest_pixels(at, view.camera))
         measured_m = view.depth_m[rows, columns].astype(np.float64)
@@ -131,7 +129,7 @@ class Refiner:
         pull = (weighted * residual).sum(axis=1)
         equations.add_picture(arms, *_pixels_per_metre(points, view.camera), structure, pull)
         matrix, vector = equations.without_offset(self._config.offset_information)
-        return _Linearised(matrix, vector, float(np.median(np.abs(residual_m))), len(usable))
+        return _Linearised(matrix, vector, residual_m)
 
     def _colour_residuals(self, seen: Float32s, expected: Floats, facing: Floats) -> tuple[Floats, Floats]:
         """Residuals (3, N) of the Lab channels and their weights, after each channel's gain and offset between model
@@ -147,7 +145,8 @@ class Refiner:
             together = (leaning * (seen - mean_seen)).sum(axis=1, keepdims=True)
             gain = np.clip((together + PLAIN_VARIANCE) / (variance + PLAIN_VARIANCE), *GAIN_RANGE)
             residual = gain * centred + mean_seen - seen
-            spread = np.median(np.abs(residual[:, ::2]), axis=1, keepdims=True)  # of half: it takes the most time here
+            middle = residual.shape[1] // 4  # of half of them: their median takes the most time here
+            spread = np.partition(np.abs(residual[:, ::2]), middle, axis=1)[:, middle : middle + 1]
             sigma = np.maximum(1.4826 * spread, self._config.lab_sigma)
             robust = facing / (1 + (residual / (2 * sigma)) ** 2) ** 2
         return residual, self._config.colour_weight * robust / sigma**2

@@ -7,12 +7,14 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Protocol
 
+from tracker.belief import believed
 from tracker.camera_motion import CameraMotion, Landmarks
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
+from tracker.found import Found, Look
 from tracker.geometry import Pose
 from tracker.lockstep import lockstep
-from tracker.looking import Asking, Found, Look, Looking, believed
+from tracker.looking import Asking, Looking
 from tracker.places import Moment, Places
 from tracker.saliency import Saliency
 from tracker.view import ObjectView

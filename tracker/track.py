@@ -8,12 +8,14 @@ from typing import TypeGuard
 
 import numpy as np
 
+from tracker.belief import believed, doubt
 from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
+from tracker.found import Attempt, Found, Look
 from tracker.frame import Mask
 from tracker.geometry import Pose
-from tracker.looking import Asking, Attempt, Found, Look, Looking, believed, doubt
+from tracker.looking import Asking, Looking
 from tracker.places import Moment, Places
 from tracker.pointing import Pointer
 from tracker.pose_filter import PoseFilter
@@ -165,6 +167,9 @@ class Track:
         self.shown, self.surest = view.mask, (self._frames_followed > 1, found.confidence)
         self._look.came_of_it(found.score)
         self._places.found(raw, now)
+        rival = self._look.rival(found) if self._config.prior else None
+        if rival:
+            self._places.suspected(rival, now.camera.now, now.camera)
         return TrackResult(
             stamp_ns=stamp_ns,
             object_id=self._model.object_id,

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
@@ -151,6 +152,7 @@ def _blocks(array: npt.NDArray, block: int) -> npt.NDArray:
 
 def _block_mean(array: Float32s, block: int) -> Float32s:
     """Mean of every block of (H, W) or (H, W, C), missing pixels counted as zero."""
-    rows = np.add.reduceat(array, np.arange(0, array.shape[0], block), axis=0)
-    total = np.add.reduceat(rows, np.arange(0, array.shape[1], block), axis=1)
-    return np.asarray(total / (block * block), np.float32)
+    below, right = -array.shape[0] % block, -array.shape[1] % block
+    full = cv2.copyMakeBorder(array, 0, below, 0, right, cv2.BORDER_CONSTANT)
+    size = (full.shape[1] // block, full.shape[0] // block)
+    return np.asarray(cv2.resize(full, size, interpolation=cv2.INTER_AREA), np.float32)

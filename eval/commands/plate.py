@@ -12,9 +12,9 @@ from tracker.terminal import STDERR, hush, progress
 
 if TYPE_CHECKING:
     from reference.sheet import Picture
+    from tracker.found import Attempt
     from tracker.frame import Frame, Mask
     from tracker.geometry import Pose
-    from tracker.looking import Attempt
     from tracker.result import TrackResult
     from tracker.saved_run import Replay
 

@@ -10,8 +10,8 @@ import numpy as np
 from eval.plates.cutout import corners_of, cut_out, pixels_of
 from reference.sheet import FAINT, INK, Picture, Sheet, fitted, line_px
 from tracker.config import TrackerConfig
+from tracker.found import Attempt, Found, Look
 from tracker.frame import Frame
-from tracker.looking import Attempt, Found, Look
 from tracker.overlay import ESTIMATE, Shape, draw_box, outline
 from tracker.result import TrackResult
 

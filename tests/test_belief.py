@@ -1,0 +1,80 @@
+"""What is asked of a pose before it is believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tracker.belief import believed, doubt
+from tracker.confidence import Grounds
+from tracker.config import TrackerConfig
+from tracker.found import Found
+from tracker.geometry import Pose
+from tracker.refinement import Refined
+from tracker.search import Hypothesis
+from tracker.verification import Evidence
+from tracker.view import ObjectView
+
+GOOD = Evidence(
+    score=0.6, surface=0.9, colour=0.8, contradicted=0.05, seen_through=0.0, outside=0.0, hidden=0.0, explained=0.9,
+    proved=0.8,
+)  # fmt: skip
+WALL = replace(GOOD, surface=0.78, hidden=0.07, explained=0.6, proved=0.37)  # behind a can's lid
+TABLE = replace(GOOD, surface=0.74, hidden=0.57, explained=0.75, proved=0.33)  # around a can's lid
+CUP = replace(GOOD, explained=0.62, proved=0.66)  # of which the inside is not known
+AIR = replace(GOOD, surface=0.1)
+ALIKE = replace(GOOD, contradicted=0.22)  # another box of that size
+GLASS = replace(GOOD, seen_through=0.2)
+CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
+
+
+@pytest.mark.parametrize(
+    ("evidence", "confidence", "how", "said"),
+    [
+        (GOOD, 0.15, "masked", ""),
+        (GOOD, 0.05, "masked", "right at 5%"),
+        (AIR, 0.9, "masked", "10% of what should be seen"),
+        (CORNER, 0.9, "masked", "20% of what is seen there is explained"),
+        (GLASS, 0.9, "masked", "20% of what should be seen is seen through"),
+        (GLASS, 0.9, "followed", "20% of what should be seen is seen through"),
+        (WALL, 0.15, "followed", ""),
+        (WALL, 0.15, "turned", ""),
+        (AIR, 0.9, "followed", "10% of what should be seen"),
+        (GOOD, 0.35, "jumped", ""),
+        (GOOD, 0.25, "jumped", "right at 25%"),
+        (GOOD, 0.35, "expected", ""),
+        (GOOD, 0.25, "expected", "right at 25%"),
+        (GOOD, 0.55, "anywhere", ""),
+        (GOOD, 0.45, "anywhere", "right at 45%"),
+        (CUP, 0.55, "anywhere", ""),
+        (WALL, 0.8, "anywhere", "goes on beyond it"),
+        (WALL, 0.35, "expected", ""),  # most of it may be hidden, but there it is likely
+        (TABLE, 0.8, "anywhere", "57% of it would be hidden"),
+        (ALIKE, 0.95, "anywhere", "22% of what is in place has another colour"),
+        (ALIKE, 0.95, "expected", "22% of what is in place has another colour"),
+        (ALIKE, 0.95, "followed", ""),  # light that changes makes other colours of the object's own
+        (ALIKE, 0.95, "masked", ""),
+    ],
+)
+def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
+    evidence: Evidence, confidence: float, how: str, said: str, can_view: ObjectView
+) -> None:
+    origin = {"followed": "prediction", "turned": "turn"}.get(how, "search")
+    refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
+    grounds = Grounds(evidence, 0.01, None if how == "anywhere" else 0.02)
+    expected, masked = how != "anywhere", how == "masked"
+    found = Found(Hypothesis(refined, evidence, origin, can_view), grounds, confidence, expected, masked)
+    followed, config = how in ("followed", "turned", "jumped"), TrackerConfig()
+    assert believed(found, followed, config) == (not said)
+    assert said in doubt(found, followed, config)
+    assert bool(doubt(found, followed, config)) == bool(said)
+
+
+def test_what_did_not_even_show_at_the_first_place_is_said_for_that(can_view: ObjectView) -> None:
+    refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
+    hypothesis = Hypothesis(refined, AIR, "search", can_view)
+    found = Found(hypothesis, Grounds(AIR, 0.01), 0.9, expected=False, masked=False, missed="hidden")
+    assert doubt(found, False, TrackerConfig()) == "hidden"
+    assert doubt("out of view", True, TrackerConfig()) == "out of view"

@@ -1,0 +1,53 @@
+"""What a pose has to show to be believed."""
+
+from __future__ import annotations
+
+from typing import TypeGuard
+
+from tracker.config import TrackerConfig
+from tracker.found import Found
+from tracker.verification import LEAST_EXPLAINED
+
+LEAST_SURFACE = 0.2  # of what should be seen: where less is in place, its colours prove nothing
+MOST_SEEN_THROUGH = 0.1  # of what should be seen: of right poses in rendered scenes one of a hundred has over 0.01
+# What is seen where nothing was expected has to end where its outline does or to show much of itself, and most of what
+# faces the camera has to be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
+LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
+# A look-alike may fit as exactly as the object itself, which a confidence is the higher for; of right poses that are
+# found out of nowhere in rendered scenes one of a hundred has more than half of this in another colour.
+MOST_CONTRADICTED = 0.15
+
+
+def believed(found: Found | str, followed: bool, config: TrackerConfig) -> TypeGuard[Found]:
+    """Whether `doubt` has nothing to say."""
+    return not doubt(found, followed, config)
+
+
+def doubt(found: Found | str, followed: bool, config: TrackerConfig) -> str:
+    """Why it is not believed, in words; empty where it is."""
+    if isinstance(found, str):
+        return found
+    lacking = _lacking(found, followed, config)
+    return lacking and (found.missed or f"poor fit: {lacking}")
+
+
+def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
+    """What a pose lacks. It has to be likely. Where nobody says which pixels are the object's, less is asked where it
+    was expected while it is followed than of what is seen again near there or has jumped, so that a state does not
+    flicker; and most where nothing was expected."""
+    seen, goes_on = found.hypothesis.evidence, found.masked or (followed and found.hypothesis.origin != "search")
+    out_of_nowhere = not goes_on and not found.expected
+    if seen.surface < LEAST_SURFACE:
+        return f"{seen.surface:.0%} of what should be seen is in place"
+    if seen.explained < LEAST_EXPLAINED:
+        return f"{seen.explained:.0%} of what is seen there is explained"
+    if seen.seen_through > MOST_SEEN_THROUGH:
+        return f"{seen.seen_through:.0%} of what should be seen is seen through"
+    if not goes_on and seen.contradicted > MOST_CONTRADICTED:
+        return f"{seen.contradicted:.0%} of what is in place has another colour"
+    if out_of_nowhere and seen.hidden > MOST_HIDDEN:
+        return f"at the best pose {seen.hidden:.0%} of it would be hidden"
+    if out_of_nowhere and seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED:
+        return "what is seen at the best pose goes on beyond it"
+    least = config.believe if goes_on else config.sure if out_of_nowhere else config.regain
+    return "" if found.confidence >= least else f"the best pose is right at {found.confidence:.0%}"
