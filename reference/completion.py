@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -22,9 +24,21 @@ from tracker.symmetry import Symmetry
 logger = logging.getLogger(__name__)
 
 MOST_VIEWS = 12
-LEAST_CONFIDENCE = 0.9  # of a pose by which a frame joins
-APART_RAD = np.radians(20)  # from every view that the model is made of, and from those that it refused, by default
 WATCHED, MOST_FALLEN = 15, 0.15  # results before and after a frame joined, and how far their mean confidence may fall
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """What may join a model. views: that it is made of, at most. apart_rad: how far from all of them a frame has to be
+    seen. again_rad: the same of frames that were refused. least_confidence: of a pose by which a frame joins. mask_of:
+    the object's pixels (H, W) in a frame by those that the tracker says; by default they are these, which end where
+    the model that it has does."""
+
+    views: int = MOST_VIEWS
+    apart_rad: float = np.radians(20)
+    again_rad: float = np.radians(20)
+    least_confidence: float = 0.9
+    mask_of: Callable[[Frame, Mask], Mask] = lambda _, mask: mask
 
 
 class Completion:
@@ -33,8 +47,7 @@ class Completion:
     the frame is taken out again.
 
     symmetry: of the object; None looks for it in every model anew, as a few views may not show it. Unless it is given,
-    it is that of the first model. apart_rad: how far from all views a frame has to be seen to join them. again_rad: the
-    same for frames that were refused.
+    it is that of the first model.
 
     model: the last one. views: that it is made of. proven: no frame has joined so lately that it may be taken out
     again. refused: frames that did not join or were taken out, by name and with the reason.
@@ -45,17 +58,14 @@ class Completion:
         model: ConceptModel,
         backend: SaliencyBackend,
         config: TrackerConfig | None = None,
-        most_views: int = MOST_VIEWS,
+        growth: Growth | None = None,
         symmetry: Symmetry | Literal["as it is"] | None = "as it is",
-        apart_rad: float = APART_RAD,
-        again_rad: float = APART_RAD,
     ) -> None:
         config = (config or TrackerConfig()).model_copy(update={"prior": False, "masks": "given"})
         symmetry = model.symmetry if symmetry == "as it is" else symmetry
-        self._registration = Registration(backend, config, model.labels, symmetry, LEAST_CONFIDENCE)
+        self._growth = growth or Growth()
+        self._registration = Registration(backend, config, model.labels, symmetry, self._growth.least_confidence)
         self._growing = GrowingModel(self._registration, model.references, model)
-        self._most_views = most_views
-        self._apart_rad, self._again_rad = apart_rad, again_rad
         self._refused_from: list[Floats] = []
         self._before: deque[float] = deque(maxlen=WATCHED)
         self._since: list[float] = []
@@ -87,7 +97,8 @@ class Completion:
         if not self._teaches(result.raw_pose, result.mask, result.confidence):
             return None
         smaller = self._growing.copy()
-        if not self._growing.join(PosedFrame(frame, result.object_id, result.raw_pose, result.mask)):
+        mask = self._growth.mask_of(frame, result.mask)
+        if not self._growing.join(PosedFrame(frame, result.object_id, result.raw_pose, mask)):
             self._refused_from.append(view_direction(result.raw_pose))
             return None
         logger.info("the model of object %r grows by %s", result.object_id, name_of(frame))
@@ -96,11 +107,11 @@ class Completion:
 
     def _teaches(self, T_cam_obj: Pose, mask: Mask, confidence: float) -> bool:
         """Whether it is surely there, and a side is seen that the model may not know."""
-        here = view_direction(T_cam_obj)
-        known = (self._growing.model.view_directions @ here > np.cos(self._apart_rad)).any()
-        tried = any(refused @ here > np.cos(self._again_rad) for refused in self._refused_from)
-        elsewhere = len(self._growing.frames) < self._most_views and not known and not tried
-        return bool(elsewhere) and confidence >= LEAST_CONFIDENCE and int(mask.sum()) >= LEAST_VISIBLE_PX
+        growth, here = self._growth, view_direction(T_cam_obj)
+        known = (self._growing.model.view_directions @ here > np.cos(growth.apart_rad)).any()
+        tried = any(refused @ here > np.cos(growth.again_rad) for refused in self._refused_from)
+        elsewhere = len(self._growing.frames) < growth.views and not known and not tried
+        return bool(elsewhere) and confidence >= growth.least_confidence and int(mask.sum()) >= LEAST_VISIBLE_PX
 
     def _watched(self, confidence: float) -> ConceptModel | None:
         """The way back."""

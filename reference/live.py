@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reference.completion import MOST_VIEWS, Completion
+from reference.completion import MOST_VIEWS, Completion, Growth
 from reference.onboard import joined_model
 from reference.segment import segment
-from reference.unposed import CENTRED, centred
+from reference.unposed import CENTRED, LEAST_CONFIDENCE, centred
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import OnboardingError
@@ -21,6 +21,7 @@ from tracker.pointing import Pointer
 from tracker.result import TrackResult
 from tracker.saliency import SaliencyBackend
 from tracker.symmetry import Symmetry
+from tracker.view import Box, bounding_box
 
 logger = logging.getLogger(__name__)
 
@@ -28,6 +29,7 @@ ENOUGH_COVERAGE = 0.6  # of the viewing sphere; a turn about a standing object s
 # It starts from one view, whose pose gets worse the farther it is turned: the next ones are taken early, and where one
 # is refused another is soon tried.
 APART_RAD, AGAIN_RAD = np.radians(15), np.radians(5)
+MARGIN, MOSTLY = 0.15, 0.7  # of a mask's size, where its thing may go on; of a mask has to be that thing's
 PATIENCE = 30  # frames in which a thing may be found first: a camera's first ones are dark
 
 
@@ -60,6 +62,25 @@ def first_sight(frames: Iterator[Frame], there: Pointer | None) -> tuple[Frame, 
     raise reason
 
 
+def whole_of(frame: Frame, mask: Mask) -> Mask:
+    """(H, W) bool, all of the thing that stands apart where a mask has most of its pixels; that mask where there is no
+    such thing. A tracker's mask ends where the model does, and has a strip of what the thing stands on."""
+    box = bounding_box(mask)
+    if box is None:
+        return mask
+    margin_px = round(MARGIN * max(box.x1 - box.x0, box.y1 - box.y0))
+    height, width = mask.shape
+    wider = Box(
+        max(box.x0 - margin_px, 0), max(box.y0 - margin_px, 0),
+        min(box.x1 + margin_px, width), min(box.y1 + margin_px, height),
+    )  # fmt: skip
+    try:
+        whole = segment(frame, wider)
+    except OnboardingError:
+        return mask
+    return whole if (whole & mask).sum() > MOSTLY * mask.sum() else mask
+
+
 class TurnedObject:
     """Made by one frame and the object's mask (H, W) in it, whose centre and camera axes set the object frame. `see`
     every further frame; `model` is what is known by then, whole at any time.
@@ -86,7 +107,8 @@ class TurnedObject:
         first = centred(replace(frame, masks={}), mask, object_id, config)
         model = joined_model([first], backend, config.view, config.cloud, vocabulary, symmetry)
         self._views, self._coverage = views, coverage
-        self._completion = Completion(model, backend, config, views, symmetry, APART_RAD, AGAIN_RAD)
+        growth = Growth(views, APART_RAD, AGAIN_RAD, LEAST_CONFIDENCE, whole_of)
+        self._completion = Completion(model, backend, config, growth, symmetry)
         self._tracker = ObjectTracker(model, config, backend)
         self._frames, self._source = 1, frame.provenance.source
         (result,) = self._tracker.step(replace(frame, masks={object_id: mask}))

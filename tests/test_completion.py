@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.completion import WATCHED, Completion
+from reference.completion import WATCHED, Completion, Growth
 from reference.onboard import onboard
 from tracker.concept import ConceptModel
 from tracker.errors import ConfigError, ModelError
@@ -83,7 +83,7 @@ def test_views_are_apart_and_no_more_than_asked_for(
     assert model is not None
     first, second = model.view_directions
     assert np.degrees(np.arccos(first @ second)) > 20
-    assert grown(Completion(one_sided, attributes, most_views=1), followed) == (None, None)
+    assert grown(Completion(one_sided, attributes, growth=Growth(views=1)), followed) == (None, None)
 
 
 def test_what_is_not_sure_teaches_nothing(
@@ -119,7 +119,7 @@ def test_what_was_refused_is_tried_again_from_as_far_as_asked_for(
     followed: list[tuple[Frame, TrackResult]],
 ) -> None:
     """Two wrong poses, 4 degrees apart."""
-    completion = Completion(one_sided, attributes, again_rad=np.radians(again_deg))
+    completion = Completion(one_sided, attributes, growth=Growth(again_rad=np.radians(again_deg)))
     for frame, result in followed[-2:]:
         assert result.raw_pose is not None
         turned = result.raw_pose @ Pose(about(np.array([0.0, 0.0, 1.0]), 0.5), np.zeros(3))

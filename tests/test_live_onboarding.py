@@ -13,7 +13,7 @@ import pytest
 import reference.__main__
 import reference.live
 import tracker.sources
-from reference.live import PATIENCE, Progress, TurnedObject, first_sight
+from reference.live import PATIENCE, Progress, TurnedObject, first_sight, whole_of
 from tests.live_camera import LiveCamera
 from tracker.concept import ConceptModel
 from tracker.errors import OnboardingError, SourceError
@@ -35,6 +35,14 @@ def scene() -> SyntheticScene:
     return open_scene(f"turn?object={BOX}&size=320x240")
 
 
+def errors(model: ConceptModel, scene: SyntheticScene) -> list[tuple[float, float]]:
+    """Metres and degrees of the model's views, if its first one is right."""
+    truth, first = {s.index: s.T_cam_obj for s in scene.sightings(model.object_id)}, model.references[0]
+    T_true_obj = truth[first.frame.index].inverse() @ first.T_cam_obj
+    expected = [(view.T_cam_obj, truth[view.frame.index] @ T_true_obj) for view in model.references]
+    return [(pose.distance_to_m(true), float(np.degrees(pose.angle_to_rad(true)))) for pose, true in expected]
+
+
 @pytest.fixture(scope="module")
 def turned(scene: SyntheticScene, attributes: SaliencyBackend) -> Turned:
     """Every third frame, masks taken away; 27 % of the viewing sphere are enough."""
@@ -47,14 +55,37 @@ def turned(scene: SyntheticScene, attributes: SaliencyBackend) -> Turned:
 def test_the_model_holds_more_of_the_object_at_poses_that_are_right(turned: Turned, scene: SyntheticScene) -> None:
     model = turned[0].model
     assert len(model.references) >= 2
-    truth = {sighting.index: sighting.T_cam_obj for sighting in scene.sightings(BOX)}
-    first = model.references[0]
-    T_true_obj = truth[first.frame.index].inverse() @ first.T_cam_obj
-    for view in model.references:
-        assert not view.frame.masks
-        expected = truth[view.frame.index] @ T_true_obj
-        assert view.T_cam_obj.distance_to_m(expected) < 0.003
-        assert np.degrees(view.T_cam_obj.angle_to_rad(expected)) < 3
+    assert not any(view.frame.masks for view in model.references)
+    assert np.all(np.array(errors(model, scene)) < (0.003, 3))
+
+
+def test_a_round_thing_does_not_slip_from_view_to_view(attributes: SaliencyBackend) -> None:
+    """A can that turns by 114 degrees, its masks by depth alone."""
+    scene = open_scene("turn?object=soup_can&size=320x240")
+    frames = (replace(scene[index], masks={}) for index in range(0, 90, 2))
+    turned = TurnedObject(*first_sight(frames, None), "soup_can", attributes)
+    for frame in frames:
+        turned.see(frame)
+    assert len(turned.model.references) >= 4
+    assert np.all(np.array(errors(turned.model, scene)) < (0.003, 4))
+
+
+def test_a_mask_that_ends_where_the_model_does_is_made_whole(scene: SyntheticScene) -> None:
+    frame = scene[0]
+    mask = frame.masks[BOX]
+    half = mask & (np.arange(mask.shape[1]) < np.flatnonzero(mask.any(axis=0)).mean() + 4)
+    on_the_table = half | np.roll(half, 4, axis=0)
+    for partly in (half, on_the_table):
+        whole = whole_of(replace(frame, masks={}), partly)
+        assert (whole & mask).sum() > 0.6 * mask.sum()
+        assert (whole & ~mask).sum() < 0.05 * whole.sum()
+
+
+def test_a_mask_of_nothing_that_stands_apart_stays(scene: SyntheticScene) -> None:
+    table = np.zeros(scene[0].depth_m.shape, bool)
+    table[200:215, 20:60] = True
+    assert whole_of(scene[0], table) is table
+    assert not whole_of(scene[0], np.zeros_like(table)).any()
 
 
 def test_its_notes_say_how_it_came_about(turned: Turned, tmp_path: Path) -> None:

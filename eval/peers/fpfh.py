@@ -1,6 +1,6 @@
 """Peer `fpfh`: open3d's FPFH features, RANSAC over their matches, point-to-plane ICP. Every frame anew.
 
-Frame and model are thinned to a fortieth of the diameter; mutual nearest features (all nearest ones where few are
+Frame and model are thinned to 1.5 % of the diameter; mutual nearest features (all nearest ones where few are
 mutual); open3d's RANSAC (three points, point to point, edge lengths, distances and normals checked); then the ICP. The
 geometry of most objects nearly repeats, so RANSAC runs several times with other seeds and the best fit counts.
 Confidence is its fitness: the share of the seen points that lie on the model.
@@ -34,7 +34,7 @@ class FpfhConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    voxel: float = Field(default=0.025, gt=0)
+    voxel: float = Field(default=0.015, gt=0)
     feature_radius: float = Field(default=0.2, gt=0)
     neighbours: int = Field(default=200, ge=3)
     mutual: bool = True
@@ -48,7 +48,7 @@ class FpfhConfig(BaseModel):
     icp_reach_start: float = Field(default=0.12, gt=0)
     icp_reach_end: float = Field(default=0.025, gt=0)
     good_fitness: float = Field(default=0.97, ge=0, le=1)
-    least_fitness: float = Field(default=0.5, ge=0, le=1)
+    least_fitness: float = Field(default=0.1, ge=0, le=1)
 
 
 class FpfhPose:
