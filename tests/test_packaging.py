@@ -77,7 +77,7 @@ print(json.dumps([tracker.__file__, presets, vocabularies, page]))
     assert done.returncode == 0, done.stderr
     home, presets, vocabularies, page = json.loads(done.stdout)
     assert home == str(site / "tracker" / "__init__.py")
-    assert (len(presets), len(vocabularies)) == (10, 5)
+    assert (len(presets), len(vocabularies)) == (12, 5)
     assert all(presets)
     assert all(vocabularies)
     assert "</html>" in page
