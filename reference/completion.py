@@ -27,7 +27,7 @@ MOST_VIEWS = 12
 WATCHED, MOST_FALLEN = 15, 0.15  # results before and after a frame joined, and how far their mean confidence may fall
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Growth:
     """What may join a model. views: that it is made of, at most. apart_rad: how far from all of them a frame has to be
     seen. again_rad: the same of frames that were refused. least_confidence: of a pose by which a frame joins. mask_of:

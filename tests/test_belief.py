@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracker.belief import believed, doubt
+from tracker.belief import believed, doubt, doubtful
 from tracker.confidence import Grounds
 from tracker.config import TrackerConfig
 from tracker.found import Found
@@ -27,6 +27,11 @@ CUP = replace(GOOD, explained=0.62, proved=0.66)  # of which the inside is not k
 AIR = replace(GOOD, surface=0.1)
 ALIKE = replace(GOOD, contradicted=0.22)  # another box of that size
 GLASS = replace(GOOD, seen_through=0.2)
+GLASSY = replace(GOOD, seen_through=0.07)
+HALF = replace(GOOD, surface=0.45)
+ASIDE = replace(GOOD, outside=0.25)  # a thing of another shape, in its colours
+EDGE = replace(GOOD, proved=0.2)  # a side that is not known, and a strip of one that is
+BEHIND = replace(GOOD, proved=0.2, hidden=0.45)  # as much, and the rest is hidden
 CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
 
 
@@ -54,6 +59,13 @@ CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
         (TABLE, 0.8, "anywhere", "57% of it would be hidden"),
         (ALIKE, 0.95, "anywhere", "22% of what is in place has another colour"),
         (ALIKE, 0.95, "expected", "22% of what is in place has another colour"),
+        (GLASSY, 0.95, "expected", "7% of what should be seen is seen through"),
+        (HALF, 0.95, "expected", "45% of what should be seen is in place"),
+        (ASIDE, 0.95, "expected", "25% of what should be seen is not there"),
+        (ASIDE, 0.95, "jumped", "25% of what should be seen is not there"),
+        (ASIDE, 0.95, "masked", ""),
+        (EDGE, 0.95, "expected", "20% of what is known of it"),
+        (BEHIND, 0.95, "expected", ""),
         (ALIKE, 0.95, "followed", ""),  # light that changes makes other colours of the object's own
         (ALIKE, 0.95, "masked", ""),
     ],
@@ -70,6 +82,19 @@ def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
     assert believed(found, followed, config) == (not said)
     assert said in doubt(found, followed, config)
     assert bool(doubt(found, followed, config)) == bool(said)
+
+
+@pytest.mark.parametrize(("evidence", "confidence", "masked", "is_doubtful"), [
+    (GOOD, 0.35, False, False), (GOOD, 0.25, False, True), (ASIDE, 0.95, False, True), (ASIDE, 0.25, True, False),
+])  # fmt: skip
+def test_what_is_followed_is_doubtful_where_it_would_not_be_believed_of_what_is_seen_again(
+    evidence: Evidence, confidence: float, masked: bool, is_doubtful: bool, can_view: ObjectView
+) -> None:
+    refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
+    found = Found(
+        Hypothesis(refined, evidence, "prediction", can_view), Grounds(evidence, 0.01), confidence, True, masked
+    )
+    assert doubtful(found, TrackerConfig()) == is_doubtful
 
 
 def test_what_did_not_even_show_at_the_first_place_is_said_for_that(can_view: ObjectView) -> None:

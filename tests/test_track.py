@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from reference.onboard import onboard, read_reference_frames
+from tracker import belief
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError
@@ -68,6 +69,18 @@ def test_a_rival_is_compared_in_the_next_frame_where_there_is_a_prior(
     assert result.pose.distance_to_m(can_truth) < 0.05
     starts = [look.start for look in tracker.attempt(CAN).looks if isinstance(look, Look)]
     assert len([start for start in starts if start is not None]) == (2 if prior else 0)
+
+
+def test_what_is_followed_may_be_doubtful_for_three_frames(
+    can_model: ConceptModel, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tracker, first = ObjectTracker(can_model, CARRIED), FirstMasks()
+    still = [replace(can_frames[0], index=k, stamp_ns=k * 33_000_000) for k in range(6)]
+    assert tracker.step(first(still[0]))[0].pose is not None
+    monkeypatch.setattr(belief, "_speaks_against", lambda _: "it is something else")
+    results = [tracker.step(first(frame))[0] for frame in still[1:]]
+    assert [result.state for result in results] == [TrackState.TRACKING] * 3 + [TrackState.LOST] * 2
+    assert results[3].reason == "poor fit: it is something else"
 
 
 @pytest.fixture(scope="module")

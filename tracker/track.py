@@ -8,7 +8,7 @@ from typing import TypeGuard
 
 import numpy as np
 
-from tracker.belief import believed, doubt
+from tracker.belief import MOST_DOUBTFUL, believed, doubt, doubtful
 from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
@@ -40,7 +40,7 @@ class Track:
         self._second_look: SecondLook | None = None
         self._filter = PoseFilter(config.filter)
         self._state = TrackState.INITIALISING
-        self._frames_lost, self._frames_followed, self._forgotten = 0, 0, 0
+        self._frames_lost, self._frames_followed, self._frames_doubtful, self._forgotten = 0, 0, 0, 0
         self._looked: list[Look | str] = []
         self._raw: Pose | None = None
         self.shown: Mask | None = None
@@ -97,14 +97,14 @@ class Track:
         if self._carried:
             self._places.not_found(now, suspected)
         again = "seen again: the next frame has to confirm it"
-        return self._lost(now, again if suspected else doubt(found, self._followed, self._config))
+        return self._lost(now, again if suspected else doubt(found, self._trusted, self._config))
 
     def review(self, now: Moment) -> Review | None:
         """Of the frame of the last step, where it went without concepts that it asked for."""
         if not self._look.waiting:
             return None
         self._second_look = self._second_look or SecondLook(self._model, self._config)
-        again = self._second_look(self._looked, self._places if self._searched else None, now, self._followed)
+        again = self._second_look(self._looked, self._places if self._searched else None, now, self._trusted)
         return Review(again, self._raw, now.camera.now, self._forgotten)
 
     def reviewed(self, review: Review, found: Found, camera: CameraMotion) -> None:
@@ -142,6 +142,11 @@ class Track:
         return self._state is TrackState.TRACKING
 
     @property
+    def _trusted(self) -> bool:
+        """Whether less is asked of a pose, so that a state does not flicker."""
+        return self._followed and self._frames_doubtful < MOST_DOUBTFUL
+
+    @property
     def _carried(self) -> bool:
         return self._config.masks == "carried"
 
@@ -151,7 +156,7 @@ class Track:
         return self._carried and not self._places.pointed_out
 
     def _believed(self, found: Found | str) -> TypeGuard[Found]:
-        return believed(found, self._followed, self._config)
+        return believed(found, self._trusted, self._config)
 
     def _tracked(self, now: Moment, found: Found, predicted: Pose | None) -> TrackResult:
         stamp_ns, view = now.frame.stamp_ns, found.hypothesis.view
@@ -164,6 +169,7 @@ class Track:
                 filtered = self._filter.start(raw, information, stamp_ns)
         self._state, self._frames_lost, self._frames_followed = TrackState.TRACKING, 0, self._frames_followed + 1
         self._raw = raw
+        self._frames_doubtful = self._frames_doubtful + 1 if doubtful(found, self._config) else 0
         self.shown, self.surest = view.mask, (self._frames_followed > 1, found.confidence)
         self._look.came_of_it(found.score)
         self._places.found(raw, now)
@@ -189,7 +195,8 @@ class Track:
         )
 
     def _lost(self, now: Moment, reason: str) -> TrackResult:
-        self._frames_lost, self._frames_followed, self._raw, self.shown = self._frames_lost + 1, 0, None, None
+        self._frames_lost, self._frames_followed, self._frames_doubtful = self._frames_lost + 1, 0, 0
+        self._raw, self.shown = None, None
         if self._state is TrackState.TRACKING:
             logger.info("object %r lost at frame %d: %s", self._model.object_id, now.frame.index, reason)
             self._state = TrackState.LOST
