@@ -14,10 +14,9 @@ MOST_SEEN_THROUGH = 0.1  # of what should be seen: of right poses in rendered sc
 # faces the camera has to be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
 LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
 # A look-alike may fit as exactly as the object itself, which a confidence is the higher for. Of right poses in carried
-# masks (YCB-V replay `hard`, a recording) one of a hundred goes beyond one of these, none does four times in a row. As
-# much of what can be in sight has to be known there: a pose that shows the edge of what is known fits many things.
+# masks (YCB-V replay `hard`, a recording) one of a hundred goes beyond one of these, none does four times in a row.
 MOST_CONTRADICTED, MOST_OUTSIDE, MOST_SEEN_THROUGH_AGAIN = 0.15, 0.2, 0.05
-LEAST_IN_PLACE, LEAST_KNOWN = 0.5, 0.3
+LEAST_IN_PLACE = 0.4
 MOST_DOUBTFUL = 3  # frames in a row in which what is followed may go beyond them
 
 
@@ -50,8 +49,6 @@ def _speaks_against(seen: Evidence) -> str:
         return f"{seen.outside:.0%} of what should be seen is not there"
     if seen.seen_through > MOST_SEEN_THROUGH_AGAIN:
         return f"{seen.seen_through:.0%} of what should be seen is seen through"
-    if seen.proved < LEAST_KNOWN * (1 - seen.hidden):
-        return f"the best pose shows {seen.proved:.0%} of what is known of it"
     return ""
 
 
