@@ -16,7 +16,6 @@ LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
 # A look-alike may fit as exactly as the object itself, which a confidence is the higher for. Of right poses in carried
 # masks (YCB-V replay `hard`, a recording) one of a hundred goes beyond one of these, none does four times in a row.
 MOST_CONTRADICTED, MOST_OUTSIDE, MOST_SEEN_THROUGH_AGAIN = 0.15, 0.2, 0.05
-LEAST_IN_PLACE = 0.4
 MOST_DOUBTFUL = 3  # frames in a row in which what is followed may go beyond them
 
 
@@ -43,8 +42,6 @@ def _speaks_against(seen: Evidence) -> str:
     """What speaks against a pose though it may be likely, in words; empty where nothing does."""
     if seen.contradicted > MOST_CONTRADICTED:
         return f"{seen.contradicted:.0%} of what is in place has another colour"
-    if seen.surface < LEAST_IN_PLACE:
-        return f"{seen.surface:.0%} of what should be seen is in place"
     if seen.outside > MOST_OUTSIDE:
         return f"{seen.outside:.0%} of what should be seen is not there"
     if seen.seen_through > MOST_SEEN_THROUGH_AGAIN:
