@@ -29,7 +29,7 @@ ENOUGH_COVERAGE = 0.6  # of the viewing sphere; a turn about a standing object s
 # It starts from one view, whose pose gets worse the farther it is turned: the next ones are taken early, and where one
 # is refused another is soon tried.
 APART_RAD, AGAIN_RAD = np.radians(15), np.radians(5)
-MARGIN, MOSTLY = 0.15, 0.7  # of a mask's size, where its thing may go on; of a mask has to be that thing's
+MARGIN, LEAST_SHARED = 0.15, 0.7  # of a mask's size, where its thing may go on; of a mask has to be that thing's
 PATIENCE = 30  # frames in which a thing may be found first: a camera's first ones are dark
 
 
@@ -78,7 +78,7 @@ def whole_of(frame: Frame, mask: Mask) -> Mask:
         whole = segment(frame, wider)
     except OnboardingError:
         return mask
-    return whole if (whole & mask).sum() > MOSTLY * mask.sum() else mask
+    return whole if (whole & mask).sum() > LEAST_SHARED * mask.sum() else mask
 
 
 class TurnedObject:

@@ -14,7 +14,8 @@ MOST_SEEN_THROUGH = 0.1  # of what should be seen: of right poses in rendered sc
 # faces the camera has to be in sight: else it may be a patch of a wall, or a can that stands in a table up to its lid.
 LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
 # A look-alike may fit as exactly as the object itself, which a confidence is the higher for. Of right poses in carried
-# masks (YCB-V replay `hard`, a recording) one of a hundred goes beyond one of these, none does four times in a row.
+# masks (YCB-V replay `hard`, a recording) one of a hundred at most goes beyond each of these, and none does four times
+# in a row.
 MOST_CONTRADICTED, MOST_OUTSIDE, MOST_SEEN_THROUGH_AGAIN = 0.15, 0.2, 0.05
 MOST_DOUBTFUL = 3  # frames in a row in which what is followed may go beyond them
 
