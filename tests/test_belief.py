@@ -31,6 +31,7 @@ GLASSY = replace(GOOD, seen_through=0.07)
 LITTLE = replace(GOOD, surface=0.35)  # most of it is hidden, or depth is rough
 ASIDE = replace(GOOD, outside=0.25)  # a thing of another shape, in its colours
 NARROW = replace(GOOD, proved=0.2)  # the narrow side of a box
+PATCH = replace(GOOD, goes_on=0.55)  # of a table in the colour of a lid
 CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
 
 
@@ -63,6 +64,8 @@ CORNER = replace(GOOD, explained=0.2)  # of a mask around a wall
         (ASIDE, 0.95, "expected", "25% of what should be seen is not there"),
         (ASIDE, 0.95, "jumped", "25% of what should be seen is not there"),
         (ASIDE, 0.95, "masked", ""),
+        (PATCH, 0.95, "expected", "what is seen goes on beyond 55% of its outline"),
+        (PATCH, 0.95, "followed", ""),  # for a while
         (NARROW, 0.95, "expected", ""),
         (ALIKE, 0.95, "followed", ""),  # light that changes makes other colours of the object's own
         (ALIKE, 0.95, "masked", ""),
@@ -84,6 +87,7 @@ def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
 
 @pytest.mark.parametrize(("evidence", "confidence", "masked", "is_doubtful"), [
     (GOOD, 0.35, False, False), (GOOD, 0.25, False, True), (ASIDE, 0.95, False, True), (ASIDE, 0.25, True, False),
+    (PATCH, 0.95, False, True),
 ])  # fmt: skip
 def test_what_is_followed_is_doubtful_where_it_would_not_be_believed_of_what_is_seen_again(
     evidence: Evidence, confidence: float, masked: bool, is_doubtful: bool, can_view: ObjectView
@@ -93,6 +97,20 @@ def test_what_is_followed_is_doubtful_where_it_would_not_be_believed_of_what_is_
         Hypothesis(refined, evidence, "prediction", can_view), Grounds(evidence, 0.01), confidence, True, masked
     )
     assert doubtful(found, TrackerConfig()) == is_doubtful
+
+
+@pytest.mark.parametrize("how", ["followed", "jumped", "expected", "anywhere", "masked"])
+def test_what_is_seen_again_has_to_look_as_it_usually_did(how: str, can_view: ObjectView) -> None:
+    origin = "prediction" if how == "followed" else "search"
+    refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
+    found = Found(
+        Hypothesis(refined, GOOD, origin, can_view), Grounds(GOOD, 0.01), 0.9, how != "anywhere", how == "masked"
+    )
+    followed, config = how in ("followed", "jumped"), TrackerConfig()
+    for explained in (0.0, found.explains, found.explains / 0.65):
+        assert believed(replace(found, usually=explained), followed, config)
+    said = doubt(replace(found, usually=2 * found.explains), followed, config)
+    assert said == ("" if how in ("followed", "masked") else "poor fit: it explains 50% of what it usually does")
 
 
 def test_what_did_not_even_show_at_the_first_place_is_said_for_that(can_view: ObjectView) -> None:

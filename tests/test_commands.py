@@ -721,7 +721,7 @@ def test_eval_scenarios_prints_a_table_and_writes_every_frame(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("kitchen",), ("'kitchen'", "hidden, away, hand, jerk, lights, blind, swapped")),
+        (("kitchen",), ("'kitchen'", "hidden, away, gone, hand, jerk, lights, blind, swapped")),
         (("--seeds", 0), ("--seeds", "0")),
         (("--first-seed", -1), ("--first-seed", "-1")),
         (("--views", 0), ("--views", "0")),

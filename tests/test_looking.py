@@ -88,11 +88,37 @@ def test_what_is_found_elsewhere_knows_why_it_was_missed(
 
 def test_while_it_is_lost_no_place_is_passed_over(can_looking: Counted, can_frames: list[Frame]) -> None:
     look = Look(can_frames[0].masks[CAN], None, masked=True)
-    for score, seen in ((0.7, 1), (None, 2), (0.7, 1)):
+    found = can_looking([look], can_frames[0])
+    assert isinstance(found, Found)
+    for believed, seen in ((found, 1), (None, 2), (found, 1)):
         can_looking.seen = 0
-        can_looking.looking.came_of_it(score)
+        can_looking.looking.came_of_it(believed)
         assert isinstance(can_looking([look, "hidden"], can_frames[0]), Found)
         assert can_looking.seen == seen
+
+
+def test_what_it_usually_explains_is_the_middle_of_the_last_frames_in_which_it_was_followed(
+    can_looking: Counted, can_frames: list[Frame]
+) -> None:
+    look = Look(can_frames[0].masks[CAN], None, masked=True)
+    found = can_looking([look], can_frames[0])
+    assert isinstance(found, Found)
+    assert found.usually == 0.0
+    hardly = replace(found, hypothesis=replace(found.hypothesis, evidence=replace(GOOD, score=0.1)))
+    for believed in (*[found] * 20, None, *[hardly] * 14):
+        can_looking.looking.came_of_it(believed)
+    again = can_looking([look], can_frames[0])
+    assert isinstance(again, Found)
+    assert again.usually == found.explains
+    can_looking.looking.came_of_it(hardly)
+    can_looking.looking.came_of_it(hardly)
+    again = can_looking([look], can_frames[0])
+    assert isinstance(again, Found)
+    assert again.usually == hardly.explains
+    can_looking.looking.forget()
+    again = can_looking([look], can_frames[0])
+    assert isinstance(again, Found)
+    assert again.usually == 0.0
 
 
 def test_concepts_are_asked_for_once_in_so_many_looks(

@@ -43,7 +43,7 @@ def turns_deg(name: str, seed: int) -> list[float]:
 def test_the_seed_chooses_object_and_paths_and_the_object_can_be_asked_for(name: str) -> None:
     kind = SCENES[name]
     assert [kind.hero(seed) for seed in range(6)] == list(OBJECTS)
-    assert 60 <= kind.frames <= 90
+    assert 60 <= kind.frames <= 162
     one, other = (kind.build(seed, "mug") for seed in (1, 2))
     for time_s in (0.0, 0.5):
         assert one.tracked[0].at(time_s).distance_to_m(other.tracked[0].at(time_s)) > 1e-3
@@ -77,6 +77,25 @@ def test_away_the_object_comes_back_elsewhere_and_turned_beside_its_look_alike(s
     assert abs(other.at(gone[0] / RATE_HZ).translation_m[0]) > 0.5  # not there before the object is gone
     assert other.at((gone[-1] - 1) / RATE_HZ).distance_to_m(other.at(end_s)) < 1e-6  # and there before it is back
     assert len(sightings("away", seed)) - gone[-1] > 12
+
+
+@pytest.mark.parametrize("seed", [2])
+def test_gone_for_a_hundred_frames_beside_a_look_alike_half_of_them_in_another_room(seed: int) -> None:
+    away = out_of_sight("gone", seed)
+    assert len(away) == 100
+    assert min(s.visible_fraction for s in sightings("gone", seed) if s.index not in away) > 0.75
+    assert turns_deg("gone", seed)[away[-1]] > 35
+    layout = SCENES["gone"].build(seed, SCENES["gone"].hero(seed))
+    assert callable(layout.T_world_cam)
+    cameras = [layout.T_world_cam(k / RATE_HZ) for k in range(SCENES["gone"].frames)]
+    jumps = [k for k, (a, b) in enumerate(pairwise(cameras), 1) if a.distance_to_m(b) > 1]
+    assert jumps == [away[0] + 50, away[-1] + 1]
+    alike = [p.at(0.0) for p in layout.surroundings if p.thing.name == f"{layout.tracked[0].thing.name} look-alike"]
+    assert len(alike) == 2
+    for camera, other in zip((cameras[0], cameras[away[-1]]), alike, strict=True):
+        assert (camera.inverse() @ other).translation_m[2] < 1
+    hero = layout.tracked[0].at(0.0)
+    assert 0.06 < alike[0].distance_to_m(hero) < 0.4
 
 
 @pytest.mark.parametrize("seed", [2, 4])

@@ -16,7 +16,8 @@ LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
 # A look-alike may fit as exactly as the object itself, which a confidence is the higher for. Of right poses in carried
 # masks (YCB-V replay `hard`, a recording) one of a hundred at most goes beyond each of these, and none does four times
 # in a row.
-MOST_CONTRADICTED, MOST_OUTSIDE, MOST_SEEN_THROUGH_AGAIN = 0.15, 0.2, 0.05
+MOST_CONTRADICTED, MOST_OUTSIDE, MOST_SEEN_THROUGH_AGAIN, MOST_GOES_ON = 0.15, 0.2, 0.05, 0.4
+AS_USUAL = 0.6  # share of what it explained while it was followed: in rendered scenes one right return of 50 had less
 MOST_DOUBTFUL = 3  # frames in a row in which what is followed may go beyond them
 
 
@@ -47,6 +48,8 @@ def _speaks_against(seen: Evidence) -> str:
         return f"{seen.outside:.0%} of what should be seen is not there"
     if seen.seen_through > MOST_SEEN_THROUGH_AGAIN:
         return f"{seen.seen_through:.0%} of what should be seen is seen through"
+    if seen.goes_on > MOST_GOES_ON:
+        return f"what is seen goes on beyond {seen.goes_on:.0%} of its outline"
     return ""
 
 
@@ -64,6 +67,8 @@ def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
         return f"{seen.seen_through:.0%} of what should be seen is seen through"
     if not goes_on and (wrong := _speaks_against(seen)):
         return wrong
+    if not goes_on and found.explains < AS_USUAL * found.usually:
+        return f"it explains {found.explains / found.usually:.0%} of what it usually does"
     if out_of_nowhere and seen.hidden > MOST_HIDDEN:
         return f"at the best pose {seen.hidden:.0%} of it would be hidden"
     if out_of_nowhere and seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED:

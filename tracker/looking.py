@@ -23,6 +23,7 @@ from tracker.stopwatch import Stopwatch
 from tracker.view import ObjectView, view_object
 
 MOST_TRIED = 64  # poses that are remembered
+REMEMBERED = 30  # frames in which it was followed: a second of a usual camera
 STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
 CLEARLY_MORE = 0.05  # has a rival to explain: the evidence of one pose differs less by what moves it a bit
 TURNED_RAD = 0.175  # a pose farther than this from a right one is wrong
@@ -41,6 +42,7 @@ class Looking:
         self._search, self._centre_m = Search(model, config), model.points.mean(axis=0)
         self._without_concepts = 0  # looks in a row that did without
         self._usual = 0.0  # score of what was believed last
+        self._explained: deque[float] = deque(maxlen=REMEMBERED)  # while it was followed
         self.waiting = False
         self.tried: deque[Found] = deque(maxlen=MOST_TRIED)
 
@@ -60,9 +62,15 @@ class Looking:
             return missed or "nothing in the picture looks like it"
         return replace(best, missed=missed)
 
-    def came_of_it(self, score: float | None) -> None:
-        """The score of what was believed, None where the object is lost: next time every place is looked at then."""
-        self._usual = 1.0 if score is None else score
+    def came_of_it(self, found: Found | None) -> None:
+        """What was believed, None where the object is lost: next time every place is looked at then."""
+        self._usual = 1.0 if found is None else found.score
+        if found is not None:
+            self._explained.append(found.explains)
+
+    def forget(self) -> None:
+        """How it usually looked."""
+        self._explained.clear()
 
     def concepts_asked(self) -> None:
         """Somebody else has done so."""
@@ -136,7 +144,8 @@ class Looking:
         grounds = self._grounds(hypothesis, look.expected)
         # What is not believed for its surface is no rival of a pose that may be.
         likely = confidence(grounds) if hypothesis.evidence.surface >= LEAST_SURFACE else 0.0
-        found = Found(hypothesis, grounds, likely, self._expects(look, hypothesis), look.masked)
+        usually = float(np.median(self._explained)) if self._explained else 0.0
+        found = Found(hypothesis, grounds, likely, self._expects(look, hypothesis), look.masked, usually=usually)
         self.tried.append(found)
         return found
 

@@ -157,4 +157,5 @@ class Search:
             if own is None:
                 return None
             view, appearance = own, view_appearance(own)
-        return Hypothesis(refined, self._verify(refined.T_cam_obj, view, appearance), origin, view)
+        evidence = self._verify(refined.T_cam_obj, view, appearance, around=not sight.masked)
+        return Hypothesis(refined, evidence, origin, view)

@@ -67,6 +67,7 @@ class Track:
     def point_out(self, there: Pointer) -> None:
         """In the next frame. What was known until then is not."""
         self._forget()
+        self._look.forget()
         self._places.point_out(there)
         self._state = TrackState.INITIALISING
 
@@ -171,7 +172,7 @@ class Track:
         self._raw = raw
         self._frames_doubtful = self._frames_doubtful + 1 if doubtful(found, self._config) else 0
         self.shown, self.surest = view.mask, (self._frames_followed > 1, found.confidence)
-        self._look.came_of_it(found.score)
+        self._look.came_of_it(found)
         self._places.found(raw, now)
         rival = self._look.rival(found) if self._config.prior else None
         if rival:

@@ -13,6 +13,7 @@ from tracker.geometry import Pose
 from tracker.lighting import colours_apart
 from tracker.projection import CELL_PX as SELF_HIDDEN_PX
 from tracker.projection import nearest_pixels, not_self_hidden, project
+from tracker.surroundings import goes_on
 from tracker.view import ObjectView
 
 
@@ -41,7 +42,8 @@ class Evidence:
     seen_through: share where the picture shows something behind the model. outside: share that should be seen and lies
     outside the mask. hidden: share of the camera-facing model that something in front hides. explained: share of the
     object's measured pixels on which a part of the model lies in place. proved: how much of the model's surface is in
-    place, as a share of the most that it can show at once."""
+    place, as a share of the most that it can show at once. goes_on: share of a ring around what is in place where what
+    is seen goes on, see `tracker.surroundings`; 0 where it was not asked for."""
 
     score: float
     surface: float
@@ -52,6 +54,7 @@ class Evidence:
     hidden: float
     explained: float
     proved: float
+    goes_on: float = 0.0
 
     @property
     def of_itself(self) -> float:
@@ -77,7 +80,10 @@ class Verifier:
         self._most = _most_shown(self._normals)
         self._sigma_m = max(config.depth_sigma * model.diameter_m, config.depth_sigma_least_m)
 
-    def __call__(self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance) -> Evidence:
+    def __call__(
+        self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance, *, around: bool = False
+    ) -> Evidence:
+        """around: whether to look at what is around it, too."""
         at = project(self._points, self._normals, T_cam_obj, view.camera)
         faces = (at.facing > 0.2) & (at.points_cam[:, 2] > 0)
         if not faces.any():
@@ -101,7 +107,8 @@ class Verifier:
         colour = usual * np.exp(-0.5 * (apart / self._config.lab_sigma) ** 2)
         met = max(float(surface.sum()), 1e-9)
         agreed = float((surface * colour**self._config.colour_share).sum() / total)
-        explained = _explained(rows[in_place], columns[in_place], view, round(CELL_PX * finer))
+        met_px = rows[in_place], columns[in_place]
+        explained = _explained(*met_px, view, round(CELL_PX * finer))
         return Evidence(
             score=agreed * worth(explained),
             surface=float(surface.sum() / total),
@@ -112,6 +119,7 @@ class Verifier:
             hidden=float((at.facing * hidden).sum() / (at.facing * faces).sum()),
             explained=explained,
             proved=float(weights[in_place].sum() / self._most),
+            goes_on=goes_on(*met_px, appearance.lab[0], view, finer) if around else 0.0,
         )
 
 

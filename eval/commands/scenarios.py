@@ -20,7 +20,7 @@ class Scenarios:
     are rendered: pointed out in the first frame only, then carried."""
 
     names: tyro.conf.Positional[tuple[str, ...]] = ()
-    """Which scenarios: hidden, away, hand, jerk, lights, blind, swapped. Default: all."""
+    """Which scenarios: hidden, away, gone, hand, jerk, lights, blind, swapped. Default: all."""
     seeds: int = 6
     """How many runs a scenario, each with an object, paths, clutter and times of its own; six have an object each."""
     first_seed: int = 0

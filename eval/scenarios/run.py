@@ -29,7 +29,7 @@ from tracker.saliency import BackendOptions
 from tracker.sources.synthetic import open_scene
 from tracker.threads import torch_threads
 
-SCENARIOS = ("hidden", "away", "hand", "jerk", "lights", "blind", "swapped")
+SCENARIOS = ("hidden", "away", "gone", "hand", "jerk", "lights", "blind", "swapped")
 BACKEND = "attributes"
 REFERENCE_SCENE, REFERENCE_FRAMES = "turn", 284  # in which the object turns once all around
 JUMP_RAD = 0.5  # turned by this much between two frames, object and camera have jumped: no hand is as fast

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tracker.sources.synthetic.scenes.crowded import shelf, tabletop, twins
 from tracker.sources.synthetic.scenes.disturbed import blind, hand, hidden, jerk, lights
 from tracker.sources.synthetic.scenes.layout import Layout
-from tracker.sources.synthetic.scenes.replaced import away, swapped
+from tracker.sources.synthetic.scenes.replaced import away, gone, swapped
 from tracker.sources.synthetic.scenes.single import leave, still, turn
 from tracker.sources.synthetic.things.objects import OBJECTS
 
@@ -38,6 +38,7 @@ SCENES: Mapping[str, SceneKind] = {
     "twins": SceneKind("two objects that are alike, one passes before the other", 90, twins, ("mug",)),
     "hidden": SceneKind("something covers the object for a second", 78, hidden, ANY),
     "away": SceneKind("the object is taken away and comes back elsewhere, beside a look-alike", 90, away, ANY),
+    "gone": SceneKind("the object is not there for 100 frames, half of them of another room", 162, gone, ANY),
     "hand": SceneKind("a hand reaches partly before the object", 66, hand, ANY),
     "jerk": SceneKind("the camera jumps by 15 cm and 40 degrees", 66, jerk, ANY),
     "lights": SceneKind("brightness and colour of the light change", 60, lights, ANY),

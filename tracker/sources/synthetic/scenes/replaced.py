@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tracker.geometry import Pose
 from tracker.sources.synthetic.motion import Motion, through
@@ -18,6 +19,9 @@ OUTSIDE_M = 0.85  # x of what has been taken out of the picture
 CARRIED_S = 0.45  # how long that takes
 LIFT_M = 0.05
 Stop = tuple[float, float, float, float]  # seconds, x and y in metres, yaw in degrees
+GONE_FRAMES = 100
+NEXT_DOOR = Pose(np.eye(3), np.array([20.0, 0.0, 0.0]))  # T_world_room of the other room
+MOVES_M = 0.04  # at most, until it is gone
 SIMILAR = 3  # so many things nearest in size may take the object's place
 
 
@@ -77,6 +81,35 @@ def swapped(seed: int, hero: str) -> Layout:
         return placed_on_mat(other, *ELSEWHERE_M, 0) if time_s < swap_s else in_its_place(time_s)
 
     return Layout([Placed(st.hero, hero_motion)], [*st.surroundings, Placed(other, other_motion)], st.T_world_cam)
+
+
+def gone(seed: int, hero: str) -> Layout:
+    """For a hundred frames the object is not there, though a look-alike is, beside where it was; in the second half of
+    them the pictures are of another, darker room, where such a look-alike is, too. Then it is back, turned."""
+    here, there = stage(seed, hero, 48), stage(seed, hero, 49)
+    first = int(here.rng.integers(26, 34))
+    gone_s, cut_s, back_s = (between(first + frames) for frames in (0, GONE_FRAMES // 2, GONE_FRAMES))
+    turn = Rotation.from_euler("z", here.rng.choice([-1, 1]) * here.rng.uniform(40, 130), degrees=True).as_matrix()
+    T_world_last = here.T_world_hero(gone_s)
+    T_world_back = Pose(turn @ T_world_last.rotation, T_world_last.translation_m)
+    hidden = placed_on_mat(here.hero, *ELSEWHERE_M, 0)
+
+    def hero_motion(time_s: float) -> Pose:
+        if gone_s < time_s < back_s:
+            return NEXT_DOOR @ hidden if time_s > cut_s else hidden
+        return here.T_world_hero(time_s) if time_s < gone_s else T_world_back
+
+    def camera(time_s: float) -> Pose:
+        return NEXT_DOOR @ there.T_world_cam(time_s) if cut_s < time_s < back_s else here.T_world_cam(time_s)
+
+    other = look_alike(here.hero, here.rng.uniform(90, 270))
+    beside_m = T_world_last.translation_m[0] + here.rng.choice([-1, 1]) * (2 * here.reach_m + GAP_M + MOVES_M)
+    others = [
+        Placed(other, placed_on_mat(other, beside_m, -MOVES_M, here.rng.uniform(-180, 180))),
+        Placed(other, NEXT_DOOR @ placed_on_mat(other, 0.0, 0.0, there.rng.uniform(-180, 180))),
+    ]
+    next_door = [Placed(placed.thing, NEXT_DOOR @ placed.at(0.0)) for placed in there.surroundings]
+    return Layout([Placed(here.hero, hero_motion)], [*here.surroundings, *next_door, *others], camera)
 
 
 def _others(hero: str) -> list[Thing]:
