@@ -31,7 +31,7 @@ ORDER = {
         "grounding", "symmetry", "declared_symmetry", "concept", "revolution", "measures", "matching", "appearance",
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "lighting", "surroundings",
-        "verification", "refinement", "confidence", "pose_filter", "config", "result", "smoothing", "stopwatch",
+        "verification", "refinement", "confidence", "pose_filter", "rest", "config", "result", "smoothing", "stopwatch",
         "search", "found", "belief", "looking", "lockstep", "places", "reviews", "track", "pipeline", "remote_control",
         "bop_rows", "pose_files", "ros_results", "output", "saved_run", "overlay", "video", "rerun_log", "viewer",
         "web", "terminal", "__main__",

@@ -10,7 +10,7 @@ import pytest
 from tracker.belief import believed, doubt, doubtful
 from tracker.confidence import Grounds
 from tracker.config import TrackerConfig
-from tracker.found import Found
+from tracker.found import Found, Usual
 from tracker.geometry import Pose
 from tracker.refinement import Refined
 from tracker.search import Hypothesis
@@ -100,17 +100,31 @@ def test_what_is_followed_is_doubtful_where_it_would_not_be_believed_of_what_is_
 
 
 @pytest.mark.parametrize("how", ["followed", "jumped", "expected", "anywhere", "masked"])
-def test_what_is_seen_again_has_to_look_as_it_usually_did(how: str, can_view: ObjectView) -> None:
+@pytest.mark.parametrize(
+    ("usual", "said", "asked_of"),
+    [
+        (Usual(0.7, 0.85, 0.02), "", ()),
+        (Usual(0.9, 1.0, 0.0), "", ()),
+        (Usual(0.6, 0.8, 0.3), "", ()),
+        (Usual(1.5, 0.8, 0.05), "it explains 38% of what it usually does", ("jumped", "anywhere")),
+        (Usual(0.6, 1.2, 0.05), "its colours agree to 80%, to 120% as", ("jumped", "expected", "anywhere")),
+        (
+            Usual(0.6, 0.8, -0.1),
+            "5% of what is in place has another colour, -10% had",
+            ("jumped", "expected", "anywhere"),
+        ),
+    ],
+)
+def test_what_is_seen_again_has_to_look_as_it_usually_did(
+    usual: Usual, said: str, asked_of: tuple[str, ...], how: str, can_view: ObjectView
+) -> None:
     origin = "prediction" if how == "followed" else "search"
     refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
-    found = Found(
-        Hypothesis(refined, GOOD, origin, can_view), Grounds(GOOD, 0.01), 0.9, how != "anywhere", how == "masked"
-    )
-    followed, config = how in ("followed", "jumped"), TrackerConfig()
-    for explained in (0.0, found.explains, found.explains / 0.65):
-        assert believed(replace(found, usually=explained), followed, config)
-    said = doubt(replace(found, usually=2 * found.explains), followed, config)
-    assert said == ("" if how in ("followed", "masked") else "poor fit: it explains 50% of what it usually does")
+    hypothesis = Hypothesis(refined, GOOD, origin, can_view)
+    found = Found(hypothesis, Grounds(GOOD, 0.01), 0.9, how not in ("anywhere", "jumped"), how == "masked", usual=usual)
+    answer = doubt(found, how in ("followed", "jumped"), TrackerConfig())
+    assert bool(answer) == (how in asked_of)
+    assert not answer or said in answer
 
 
 def test_what_did_not_even_show_at_the_first_place_is_said_for_that(can_view: ObjectView) -> None:

@@ -15,6 +15,7 @@ from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.looking import Looking
 from tracker.refinement import Refined
+from tracker.rest import Resting
 from tracker.saliency import Query, SaliencyBackend
 from tracker.search import Hypothesis, Search
 from tracker.sources.synthetic import SyntheticScene
@@ -97,28 +98,26 @@ def test_while_it_is_lost_no_place_is_passed_over(can_looking: Counted, can_fram
         assert can_looking.seen == seen
 
 
-def test_what_it_usually_explains_is_the_middle_of_the_last_frames_in_which_it_was_followed(
+def test_how_it_usually_looks_is_the_middle_of_the_last_frames_in_which_it_was_followed(
     can_looking: Counted, can_frames: list[Frame]
 ) -> None:
-    look = Look(can_frames[0].masks[CAN], None, masked=True)
-    found = can_looking([look], can_frames[0])
-    assert isinstance(found, Found)
-    assert found.usually == 0.0
-    hardly = replace(found, hypothesis=replace(found.hypothesis, evidence=replace(GOOD, score=0.1)))
+    def again() -> Found:
+        found = can_looking([Look(can_frames[0].masks[CAN], None, masked=True)], can_frames[0])
+        assert isinstance(found, Found)
+        return found
+
+    found = again()
+    assert found.usual is None
+    hardly = replace(found, hypothesis=replace(found.hypothesis, evidence=replace(GOOD, score=0.1, colour=0.2)))
     for believed in (*[found] * 20, None, *[hardly] * 14):
         can_looking.looking.came_of_it(believed)
-    again = can_looking([look], can_frames[0])
-    assert isinstance(again, Found)
-    assert again.usually == found.explains
+    evidence = found.hypothesis.evidence
+    assert again().usual == pytest.approx((found.explains, evidence.colour, evidence.contradicted))
     can_looking.looking.came_of_it(hardly)
     can_looking.looking.came_of_it(hardly)
-    again = can_looking([look], can_frames[0])
-    assert isinstance(again, Found)
-    assert again.usually == hardly.explains
+    assert again().usual == pytest.approx((hardly.explains, 0.2, GOOD.contradicted))
     can_looking.looking.forget()
-    again = can_looking([look], can_frames[0])
-    assert isinstance(again, Found)
-    assert again.usually == 0.0
+    assert again().usual is None
 
 
 def test_concepts_are_asked_for_once_in_so_many_looks(
@@ -145,7 +144,7 @@ def test_where_concepts_lead_astray_what_surface_and_colours_lead_to_is_kept(
     """In a surprising turn, so that they were asked."""
     monkeypatch.setattr(Search, "near", lambda *_: [])
     monkeypatch.setattr(Search, "anywhere", lambda *_: [])
-    tilted = can_truth.nudged(np.array((0.12, 0.04, 0, 0, 0, 0)))
+    tilted = can_truth.nudged(np.array((0.16, 0.05, 0, 0, 0, 0)))
     assert_at(can_looking([Look(can_frames[0].masks[CAN], tilted, (tilted,), masked=True)], can_frames[0]), can_truth)
     assert can_looking.asked == 1
 
@@ -239,3 +238,53 @@ def test_what_explains_clearly_more_and_is_turned_otherwise_is_a_rival(
     looking.tried.extend((astray, other))
     assert looking.rival(astray) == (other.hypothesis.refined.T_cam_obj if is_rival else None)
     assert looking.rival(other) is None
+
+
+def at_rest(can_truth: Pose, sigma_rad: float = 0.02) -> Resting:
+    return Resting(can_truth, np.diag([sigma_rad**2] * 3 + [0.002**2] * 3))
+
+
+@pytest.fixture
+def sliver(can_frames: list[Frame]) -> Frame:
+    """A frame whose mask has only what is seen beside something in front of the can."""
+    mask, depth_m = can_frames[0].masks[CAN], can_frames[0].depth_m.copy()
+    columns = np.flatnonzero(mask.any(axis=0))
+    shown = mask & (np.arange(mask.shape[1]) < columns[0] + len(columns) // 6)
+    depth_m[mask & ~shown] *= np.float32(0.7)
+    return replace(can_frames[0], masks={CAN: shown}, depth_m=depth_m)
+
+
+def test_a_pose_that_hardly_anything_is_seen_of_is_held_by_where_it_is_if_it_stands_still(
+    can_looking: Counted, sliver: Frame, can_truth: Pose
+) -> None:
+    near = can_truth.nudged(np.array((0, 0, 0.1, 0.004, 0, 0)))
+    alone = Look(sliver.masks[CAN], near, (near,), masked=True)
+    by_itself = can_looking([alone], sliver)
+    assert isinstance(by_itself, Found)
+    found = can_looking([replace(alone, rest=lambda: at_rest(can_truth))], sliver)
+    assert_at(found, can_truth)
+    assert isinstance(found, Found)
+    assert found.hypothesis.origin == "rest"
+    assert found.confidence > by_itself.confidence
+    assert np.degrees(by_itself.hypothesis.refined.T_cam_obj.angle_to_rad(can_truth)) > 3
+
+
+def test_a_pose_that_is_sure_is_not_asked_whether_it_stands_still(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    def rest() -> Resting:
+        raise AssertionError("asked")
+
+    look = Look(can_frames[0].masks[CAN], can_truth, (can_truth,), masked=True, rest=rest)
+    assert_at(can_looking([look], can_frames[0]), can_truth)
+
+
+def test_what_stands_elsewhere_does_not_hold_a_pose_that_explains_more(
+    can_looking: Counted, sliver: Frame, can_truth: Pose
+) -> None:
+    look = Look(sliver.masks[CAN], can_truth, (can_truth,), masked=True)
+    aside = can_truth.nudged(np.array((0, 0, 0, 0.02, 0, 0)))
+    for rest in (lambda: None, lambda: at_rest(aside)):
+        found = can_looking([replace(look, rest=rest)], sliver)
+        assert isinstance(found, Found)
+        assert found.hypothesis.origin != "rest"

@@ -12,7 +12,7 @@ from tracker.surroundings import goes_on
 from tracker.view import ObjectView, ViewConfig, view_object
 
 LAB = np.array((60.0, 10.0, 10.0), np.float32)
-SAME, OTHER = np.float32((8, 0, 0)), np.float32((0, 20, 0))
+SAME, OTHER = np.array((8, 0, 0), np.float32), np.array((0, 20, 0), np.float32)
 
 
 @pytest.fixture

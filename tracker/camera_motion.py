@@ -22,7 +22,10 @@ FEATURES, CORNER_CONTRAST = 800, 8
 LEAST_FEATURES = 20  # that match: fewer say nothing about a room
 LEAST_SHARE = 0.15  # of them that move alike: chance does not bring so many together
 ROOM_M = 0.5  # the edges of a sample are at least a share of this long
-SAMPLING = RegistrationConfig(threshold_m=0.02, samples=20_000, candidates=1, seeding_below=0)
+MOST_MATCHES = 200  # the most alike
+SAMPLING = RegistrationConfig(
+    threshold_m=0.02, samples=5000, solved=300, confidence=0.9999, candidates=1, seeding_below=0
+)
 
 
 class CameraMotion:
@@ -83,6 +86,7 @@ def _motion(then: Landmarks, now: Landmarks) -> Pose | None:
     matches = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True).match(was, is_now)
     if len(matches) < LEAST_FEATURES:
         return None
+    matches = sorted(matches, key=lambda match: match.distance)[:MOST_MATCHES]
     before = torch.from_numpy(points_then[[m.queryIdx for m in matches]]).float()
     after = torch.from_numpy(points_now[[m.trainIdx for m in matches]]).float()
     none = torch.zeros_like(before)

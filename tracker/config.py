@@ -33,10 +33,11 @@ class TrackerConfig(BaseModel):
     may be lower than the last one for that. sure: confidence from which a pose whose score is so is not compared with
     others either, whatever that is, and that is asked of an object that was expected nowhere. concepts_every: looks of
     which one asks for the concepts nevertheless, where surface and colours alone lead from the prediction to such a
-    pose. verified: candidates that are refined. seed: of the sampling. device: of matching and registration, "auto" is
-    CUDA where there is one. masks: "given" by every frame, or "carried" on by the tracker itself from the first one on,
-    which a frame's mask overrules. search_every: frames between searches of the whole picture for an object that is
-    lost."""
+    pose. unsure_rad: standard deviation of its turn, by noise alone, from which a pose is held by where the object is
+    if it stands still (`tracker.rest`). verified: candidates that are refined. seed: of the sampling. device: of
+    matching and registration, "auto" is CUDA where there is one. masks: "given" by every frame, or "carried" on by the
+    tracker itself from the first one on, which a frame's mask overrules. search_every: frames between searches of the
+    whole picture for an object that is lost."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -47,6 +48,7 @@ class TrackerConfig(BaseModel):
     jump: float = Field(default=0.1, ge=0, le=1)
     sure: float = Field(default=0.5, ge=0, le=1)
     concepts_every: int = Field(default=30, ge=1)
+    unsure_rad: float = Field(default=0.01, gt=0)
     verified: int = Field(default=5, ge=1, le=64)
     seed: int = 42
     device: str = "auto"

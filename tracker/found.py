@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from tracker.confidence import Grounds
 from tracker.frame import Mask
 from tracker.geometry import Floats, Pose
+from tracker.rest import Resting
 from tracker.saliency import Saliency
 from tracker.search import Hypothesis
+
+
+class Usual(NamedTuple):
+    """Medians over the last frames in which an object was followed: of what was explained, and as in the evidence."""
+
+    explains: float
+    colour: float
+    contradicted: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,7 +27,8 @@ class Look:
     """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. expected:
     all poses that the object was expected at. place_m: (3,) camera coordinates, where somebody said that it is, though
     no pose could be told there. masked: the pixels are known to be the object's; then it is looked for in any pose too,
-    where it is not clearly near the start. contested: the next look is to be compared with it, however clear it is."""
+    where it is not clearly near the start. contested: the next look is to be compared with it, however clear it is.
+    rest: tells where it is if it stands still, None where that is not known; it is to be asked in this frame."""
 
     mask: Mask
     start: Pose | None
@@ -25,14 +36,15 @@ class Look:
     place_m: Floats | None = None
     masked: bool = False
     contested: bool = False
+    rest: Callable[[], Resting | None] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """A pose, and what speaks for it. expected: it was about there, or somebody said that it is. masked: by pixels that
     are known to be the object's. missed: why it did not even show at the first place where it was looked for; empty
-    where something did. saliency: what concepts said there, None where surface and colours were enough. usually: what
-    its poses explained while it was followed, 0 where it was not."""
+    where something did. saliency: what concepts said there, None where surface and colours were enough. usual: how it
+    looked while it was followed, None where it was not."""
 
     hypothesis: Hypothesis
     grounds: Grounds
@@ -41,7 +53,7 @@ class Found:
     masked: bool
     missed: str = ""
     saliency: Saliency | None = None
-    usually: float = 0.0
+    usual: Usual | None = None
 
     @property
     def score(self) -> float:

@@ -14,7 +14,7 @@ from tracker.cloud import LEAST_POINTS, lift
 from tracker.concept import ConceptModel
 from tracker.confidence import Grounds, confidence, turn_sigma_rad
 from tracker.config import TrackerConfig
-from tracker.found import Found, Look
+from tracker.found import Found, Look, Usual
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
 from tracker.saliency import Saliency
@@ -24,7 +24,7 @@ from tracker.view import ObjectView, view_object
 
 MOST_TRIED = 64  # poses that are remembered
 REMEMBERED = 30  # frames in which it was followed: a second of a usual camera
-STEADY_RAD = 0.1  # a pose farther than this from the expected one is a surprise
+STEADY_RAD = 0.15  # a pose farther than this from the expected one is a surprise
 CLEARLY_MORE = 0.05  # has a rival to explain: the evidence of one pose differs less by what moves it a bit
 TURNED_RAD = 0.175  # a pose farther than this from a right one is wrong
 
@@ -42,7 +42,7 @@ class Looking:
         self._search, self._centre_m = Search(model, config), model.points.mean(axis=0)
         self._without_concepts = 0  # looks in a row that did without
         self._usual = 0.0  # score of what was believed last
-        self._explained: deque[float] = deque(maxlen=REMEMBERED)  # while it was followed
+        self._looked: deque[Usual] = deque(maxlen=REMEMBERED)  # while it was followed
         self.waiting = False
         self.tried: deque[Found] = deque(maxlen=MOST_TRIED)
 
@@ -66,11 +66,12 @@ class Looking:
         """What was believed, None where the object is lost: next time every place is looked at then."""
         self._usual = 1.0 if found is None else found.score
         if found is not None:
-            self._explained.append(found.explains)
+            evidence = found.hypothesis.evidence
+            self._looked.append(Usual(found.explains, evidence.colour, evidence.contradicted))
 
     def forget(self) -> None:
         """How it usually looked."""
-        self._explained.clear()
+        self._looked.clear()
 
     def concepts_asked(self) -> None:
         """Somebody else has done so."""
@@ -96,6 +97,30 @@ class Looking:
         if view is None:
             return "no depth within the mask"
         sight = Sight.of(view, masked=look.masked)
+        return self._held((yield from self._by_itself(look, sight, clock)), look, sight, clock)
+
+    def _held(self, best: Found | str, look: Look, sight: Sight, clock: Stopwatch) -> Found | str:
+        """The same, held by where it is if it stands still, where the picture leaves it unsure and does not deny it."""
+        found = None if isinstance(best, str) else best
+        if look.rest is None or (found and found.grounds.turn_sigma_rad < self._config.unsure_rad):
+            return best
+        with clock("rest"):
+            resting = look.rest()
+        if resting is None:
+            return best
+        refined = found and found.hypothesis.refined
+        hypothesis = self._search.held(refined, resting, sight, clock)
+        if hypothesis is None:
+            return best
+        held = self._found(hypothesis, replace(look, expected=(*look.expected, resting.T_cam_obj)))
+        if found is None:
+            return held if held.confidence >= self._config.believe else best
+        denied = held.confidence < found.confidence or held.explains < found.explains - CLEARLY_MORE
+        return best if denied else replace(held, saliency=found.saliency)
+
+    def _by_itself(self, look: Look, sight: Sight, clock: Stopwatch) -> Asking[Found | str]:
+        """What the picture alone says."""
+        view = sight.view
         asks = self._without_concepts >= self._config.concepts_every - 1
         continued = None if look.start is None else self._search.continued(look.start, sight, clock)
         best = continued and self._found(continued, look)
@@ -144,8 +169,8 @@ class Looking:
         grounds = self._grounds(hypothesis, look.expected)
         # What is not believed for its surface is no rival of a pose that may be.
         likely = confidence(grounds) if hypothesis.evidence.surface >= LEAST_SURFACE else 0.0
-        usually = float(np.median(self._explained)) if self._explained else 0.0
-        found = Found(hypothesis, grounds, likely, self._expects(look, hypothesis), look.masked, usually=usually)
+        usual = Usual(*np.median(self._looked, axis=0).tolist()) if self._looked else None
+        found = Found(hypothesis, grounds, likely, self._expects(look, hypothesis), look.masked, usual=usual)
         self.tried.append(found)
         return found
 

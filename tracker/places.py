@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 
 from tracker.camera_motion import CameraMotion, Landmarks
@@ -15,6 +16,8 @@ from tracker.geometry import Pose
 from tracker.looking import Asking, Looking
 from tracker.pointing import Pointer
 from tracker.proposals import Proposals
+from tracker.refinement import Refined
+from tracker.rest import Rest, Resting
 from tracker.stopwatch import Stopwatch
 from tracker.whereabouts import Whereabouts
 
@@ -40,7 +43,7 @@ class Places:
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._config = config
-        self._where = Whereabouts()
+        self._where, self._rest = Whereabouts(), Rest()
         self._pointer: Pointer | None = None
         self._there: Mask | None = None
         self.exchange(model)
@@ -61,7 +64,7 @@ class Places:
 
     def forget(self) -> None:
         """Where it was."""
-        self._where = Whereabouts()
+        self._where, self._rest = Whereabouts(), Rest()
 
     def looks(self, now: Moment, predicted: Pose | None, followed: bool, look: Looking) -> Iterator[Look | str]:
         """One after the other until it is found; or why nowhere. predicted: where it is if it moves on as it did, which
@@ -106,8 +109,11 @@ class Places:
         """It has been seen in this frame or in an earlier one."""
         self._where.suspected(T_then_obj, then, camera)
 
-    def found(self, T_cam_obj: Pose, now: Moment) -> None:
-        self._where.found(T_cam_obj, now.camera)
+    def found(self, refined: Refined, now: Moment) -> None:
+        """In this frame."""
+        self._where.found(refined.T_cam_obj, now.camera)
+        if refined.aligned:
+            self._rest.found(refined, now.camera)
 
     def not_found(self, now: Moment, suspected: Pose | None = None) -> None:
         """suspected: T_cam_obj of what may be it, which the next frame has to confirm."""
@@ -121,11 +127,12 @@ class Places:
             yield "out of view: the mask is empty"
             return
         starts = [pose for pose in (predicted, self._where.suspect(now.camera)) if pose is not None]
+        rest = self._resting(now)
         if not starts:
-            yield Look(mask, None, masked=True)
+            yield Look(mask, None, masked=True, rest=rest)
         for k, start in enumerate(starts):
             contested = k < len(starts) - 1
-            yield Look(mask, start, tuple(starts[: k + 1]), masked=True, contested=contested)
+            yield Look(mask, start, tuple(starts[: k + 1]), masked=True, contested=contested, rest=rest)
 
     def _near(self, moving: Pose | None, now: Moment, look: Looking) -> Iterator[Look | str]:
         """Near each pose that is expected, of which there is one at least; where it is clearly at none, anywhere around
@@ -133,14 +140,24 @@ class Places:
         suspect = self._where.suspect(now.camera)
         contested = moving is not None and suspect is not None and not self.same(moving, suspect)
         near: list[Pose] = []
+        rest = self._resting(now)
         for pose in chain(() if moving is None else (moving,), self._where.expected(now.camera)):
             if not any(self.same(pose, other) for other in near):
                 near.append(pose)
                 outline = look.outline(pose, now.frame, now.clock)
-                yield outline if isinstance(outline, str) else Look(outline, pose, tuple(near), contested=contested)
+                look_there = (
+                    outline
+                    if isinstance(outline, str)
+                    else Look(outline, pose, tuple(near), contested=contested, rest=rest)
+                )
+                yield look_there
                 contested = False
         around = self._proposals.around((near[0] @ self._centre_m[None])[0], now.frame, MOVED_ON)
         yield Look(now.unclaimed(around), None, tuple(near))
+
+    def _resting(self, now: Moment) -> Callable[[], Resting | None] | None:
+        """To be asked in this frame; a pose of which nothing was known before is nowhere held."""
+        return partial(self._rest.now, now.camera) if self._config.prior else None
 
     def same(self, a: Pose, b: Pose) -> bool:
         """So near that they are looked at once."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from tracker.belief import believed
@@ -42,7 +42,10 @@ class SecondLook:
         self, looks: Iterable[Look | str], places: Places | None, now: Moment, followed: bool
     ) -> Asking[Found | None]:
         """What is believed of what the looks find, or, where that is nothing, a search of the places; or None."""
-        found = yield from self._look.best(looks, now.frame, now.clock)
+        by_itself = [
+            look if isinstance(look, str) else replace(look, rest=None) for look in looks
+        ]  # it is another frame
+        found = yield from self._look.best(by_itself, now.frame, now.clock)
         if places is not None and not believed(found, followed, self._config):
             found = yield from places.anywhere(now, self._look)
         return found if believed(found, followed, self._config) else None

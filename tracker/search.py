@@ -18,6 +18,7 @@ from tracker.geometry import Pose
 from tracker.matching import Correspondences, Matcher
 from tracker.refinement import Refined, Refiner
 from tracker.registration import Candidate, register
+from tracker.rest import Resting
 from tracker.revolution import TURNS, Turns
 from tracker.silhouette import Silhouette
 from tracker.stopwatch import Stopwatch
@@ -43,8 +44,8 @@ class Sight:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction, search, or turn, of
-    another pose about its axis. view: the pixels by which it was judged."""
+    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction, search, turn, of
+    another pose about its axis, or rest, where it is if it stands still. view: the pixels by which it was judged."""
 
     refined: Refined
     evidence: Evidence
@@ -84,6 +85,11 @@ class Search:
         if not (direct and pulled and self._alike(direct, pulled)):
             found.append(self._refined(direct, sight, "prediction", clock))
         return [hypothesis for hypothesis in found if hypothesis]
+
+    def held(self, refined: Refined | None, resting: Resting, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
+        """The pose, as sure as the picture leaves it, held by where it is if it stands still."""
+        with clock("verification"):
+            return self._judged(resting.held(refined, self._model.symmetry), sight, "rest")
 
     def _correspondences(self, cloud: PointCloud, clock: Stopwatch) -> Correspondences:
         """Which of the cloud's points is which point of the model? Of the last cloud they are kept."""

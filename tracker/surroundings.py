@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from tracker.frame import Mask
 from tracker.view import Float32s, ObjectView
@@ -13,7 +14,7 @@ INNER_PX, OUTER_PX = 1, 4  # the ring around it
 SAME_LAB = 12.0  # a colour that differs by less is the same in another light
 
 
-def goes_on(rows: np.ndarray, columns: np.ndarray, lab: Float32s, view: ObjectView, finer: float) -> float:
+def goes_on(rows: npt.NDArray, columns: npt.NDArray, lab: Float32s, view: ObjectView, finer: float) -> float:
     """In [0, 1]: of a ring around these pixels (N,) of the view, the share that is inside, so at about their depth, and
     in the colour of the nearest of them.
 
@@ -23,7 +24,7 @@ def goes_on(rows: np.ndarray, columns: np.ndarray, lab: Float32s, view: ObjectVi
     surface[rows, columns] = 1
     surface = cv2.morphologyEx(surface, cv2.MORPH_CLOSE, _disc(GAP_PX / 2 * finer))
     ring = (cv2.dilate(surface, _disc(OUTER_PX * finer)) > 0) & (cv2.dilate(surface, _disc(INNER_PX * finer)) == 0)
-    known = cv2.erode(surface, _disc(1))  # its border mixes colours
+    known = cv2.erode(surface, _disc(1)) > 0  # its border mixes colours
     if not ring.any() or not known.any():
         return 0.0
     beyond = np.nonzero(ring & view.has_depth)
@@ -32,15 +33,16 @@ def goes_on(rows: np.ndarray, columns: np.ndarray, lab: Float32s, view: ObjectVi
     return float(np.count_nonzero(apart < SAME_LAB) / np.count_nonzero(ring))
 
 
-def _nearest(of: Mask) -> np.ndarray:
-    """(h, w) for every pixel the flat index of the nearest nonzero one."""
-    _, labels = cv2.distanceTransformWithLabels(1 - of, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    flat = np.flatnonzero(of)
-    index = np.zeros(labels.max() + 1, np.intp)
+def _nearest(of: Mask) -> npt.NDArray[np.intp]:
+    """(h, w) for every pixel the flat index of the nearest one that is set."""
+    elsewhere = np.where(of, 0, 1).astype(np.uint8)
+    found = cv2.distanceTransformWithLabels(elsewhere, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    labels, flat = np.asarray(found[1], np.intp), np.flatnonzero(of)
+    index = np.zeros(int(labels.max()) + 1, np.intp)
     index[labels.reshape(-1)[flat]] = flat
     return index[labels]
 
 
-def _disc(radius_px: float) -> np.ndarray:
+def _disc(radius_px: float) -> npt.NDArray:
     across = 2 * round(radius_px) + 1
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (across, across))

@@ -24,6 +24,7 @@ from tracker.reviews import Review, SecondLook
 
 logger = logging.getLogger(__name__)
 
+SO_LONG = 300  # frames after which it may look otherwise, in another light
 PLACED_SIGMA_RAD, PLACED_SIGMA_M = 0.1, 0.01  # how surely an object is where `place` says
 
 
@@ -173,7 +174,7 @@ class Track:
         self._frames_doubtful = self._frames_doubtful + 1 if doubtful(found, self._config) else 0
         self.shown, self.surest = view.mask, (self._frames_followed > 1, found.confidence)
         self._look.came_of_it(found)
-        self._places.found(raw, now)
+        self._places.found(refined, now)
         rival = self._look.rival(found) if self._config.prior else None
         if rival:
             self._places.suspected(rival, now.camera.now, now.camera)
@@ -198,6 +199,8 @@ class Track:
     def _lost(self, now: Moment, reason: str) -> TrackResult:
         self._frames_lost, self._frames_followed, self._frames_doubtful = self._frames_lost + 1, 0, 0
         self._raw, self.shown = None, None
+        if self._frames_lost == SO_LONG:
+            self._look.forget()
         if self._state is TrackState.TRACKING:
             logger.info("object %r lost at frame %d: %s", self._model.object_id, now.frame.index, reason)
             self._state = TrackState.LOST
