@@ -112,7 +112,7 @@ class Places:
     def found(self, refined: Refined, now: Moment) -> None:
         """In this frame."""
         self._where.found(refined.T_cam_obj, now.camera)
-        if refined.aligned:
+        if refined.aligned:  # of what only stood still nothing new is known
             self._rest.found(refined, now.camera)
 
     def not_found(self, now: Moment, suspected: Pose | None = None) -> None:
@@ -140,23 +140,21 @@ class Places:
         suspect = self._where.suspect(now.camera)
         contested = moving is not None and suspect is not None and not self.same(moving, suspect)
         near: list[Pose] = []
-        rest = self._resting(now)
         for pose in chain(() if moving is None else (moving,), self._where.expected(now.camera)):
-            if not any(self.same(pose, other) for other in near):
-                near.append(pose)
-                outline = look.outline(pose, now.frame, now.clock)
-                look_there = (
-                    outline
-                    if isinstance(outline, str)
-                    else Look(outline, pose, tuple(near), contested=contested, rest=rest)
-                )
-                yield look_there
-                contested = False
+            if any(self.same(pose, other) for other in near):
+                continue
+            near.append(pose)
+            outline = look.outline(pose, now.frame, now.clock)
+            if isinstance(outline, str):
+                yield outline
+            else:
+                yield Look(outline, pose, tuple(near), contested=contested, rest=self._resting(now))
+            contested = False
         around = self._proposals.around((near[0] @ self._centre_m[None])[0], now.frame, MOVED_ON)
         yield Look(now.unclaimed(around), None, tuple(near))
 
     def _resting(self, now: Moment) -> Callable[[], Resting | None] | None:
-        """To be asked in this frame; a pose of which nothing was known before is nowhere held."""
+        """Of a tracker that knows of earlier frames."""
         return partial(self._rest.now, now.camera) if self._config.prior else None
 
     def same(self, a: Pose, b: Pose) -> bool:

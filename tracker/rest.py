@@ -19,12 +19,13 @@ from tracker.refinement import Refined
 from tracker.symmetry import Symmetry
 
 KEPT = 10  # frames
-# Errors of right poses are about four times what noise alone makes of them (YCB-V replay `hard`, a recording).
+# A right pose errs by about four times what noise alone makes of it (YCB-V replay `hard`, a recording), and by no less
+# than a share of a degree; the camera's motion comes on top.
 BIAS = 4.0
-LEAST_SIGMA_RAD, LEAST_SIGMA_M = 0.01, 0.001
-CAMERA_SIGMA_RAD, CAMERA_SIGMA_M = 0.015, 0.0015  # of the camera's motion since then
+LEAST = np.diag([0.01**2] * 3 + [0.001**2] * 3)  # covariances of (turn, radians; shift, metres)
+CAMERA = np.diag([0.015**2] * 3 + [0.0015**2] * 3)
 SAME, STILL = (float(chi2.ppf(probability, 6)) for probability in (0.9999, 0.95))  # what moves slowly is not still
-LEAST_INFORMATION = 1e-6
+LEAST_INFORMATION = 1e-6  # of a direction that the data leave free
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,10 +55,6 @@ class Resting:
         gain = self.covariance @ np.linalg.inv(self.covariance + measured.covariance)
         pose = self.T_cam_obj.nudged(gain @ deviation(measured.T_cam_obj, self.T_cam_obj))
         return replace(seen, T_cam_obj=pose, information=_information(self.covariance - gain @ self.covariance))
-
-
-LEAST = np.diag([LEAST_SIGMA_RAD**2] * 3 + [LEAST_SIGMA_M**2] * 3)
-CAMERA = np.diag([CAMERA_SIGMA_RAD**2] * 3 + [CAMERA_SIGMA_M**2] * 3)
 
 
 class Rest:
