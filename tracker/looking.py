@@ -112,7 +112,7 @@ class Looking:
         hypothesis = self._search.held(refined, resting, sight, clock)
         if hypothesis is None:
             return best
-        held = self._found(hypothesis, replace(look, expected=(*look.expected, resting.T_cam_obj)))
+        held = self._found(hypothesis, look)
         if found is None:
             return held if held.confidence >= self._config.believe else best
         denied = held.confidence < found.confidence or held.explains < found.explains - CLEARLY_MORE
