@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.appearance import ViewAppearance
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
@@ -110,9 +109,9 @@ def test_candidates_that_a_symmetry_makes_one_are_verified_once(
         best = register(*arguments)[0]
         return [replace(best, T_cam_obj=turned) for turned in parse_symmetry("z:60").equivalents(best.T_cam_obj)]
 
-    def verify(self: Verifier, pose: Pose, view: ObjectView, appearance: ViewAppearance) -> Evidence:
+    def verify(self: Verifier, pose: Pose, *seen: Any, **how: Any) -> Evidence:
         verified.append(pose)
-        return usual(self, pose, view, appearance)
+        return usual(self, pose, *seen, **how)
 
     usual = Verifier.__call__
     monkeypatch.setattr("tracker.search.register", one_and_its_turns)

@@ -74,21 +74,21 @@ def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
     """What a pose lacks. It has to be likely. Where nobody says which pixels are the object's, less is asked where it
     was expected while it is followed than of what is seen again near there or has jumped, so that a state does not
     flicker; and most where nothing was expected."""
-    seen, goes_on = found.hypothesis.evidence, found.masked or (followed and found.hypothesis.origin != "search")
-    out_of_nowhere = not goes_on and not found.expected
+    seen, continued = found.hypothesis.evidence, found.masked or (followed and found.hypothesis.origin != "search")
+    out_of_nowhere = not continued and not found.expected
     if seen.surface < LEAST_SURFACE:
         return f"{seen.surface:.0%} of what should be seen is in place"
     if seen.explained < LEAST_EXPLAINED:
         return f"{seen.explained:.0%} of what is seen there is explained"
     if seen.seen_through > MOST_SEEN_THROUGH:
         return f"{seen.seen_through:.0%} of what should be seen is seen through"
-    if not goes_on and (wrong := _speaks_against(seen)):
+    if not continued and (wrong := _speaks_against(seen)):
         return wrong
-    if not goes_on and (unusual := _unusual(found, out_of_nowhere)):
+    if not continued and (unusual := _unusual(found, out_of_nowhere)):
         return unusual
     if out_of_nowhere and seen.hidden > MOST_HIDDEN:
         return f"at the best pose {seen.hidden:.0%} of it would be hidden"
     if out_of_nowhere and seen.explained < LEAST_ENDS and seen.proved < LEAST_PROVED:
         return "what is seen at the best pose goes on beyond it"
-    least = config.believe if goes_on else config.sure if out_of_nowhere else config.regain
+    least = config.believe if continued else config.sure if out_of_nowhere else config.regain
     return "" if found.confidence >= least else f"the best pose is right at {found.confidence:.0%}"
