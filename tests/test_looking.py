@@ -264,7 +264,7 @@ def test_a_pose_that_hardly_anything_is_seen_of_is_held_by_where_it_is_if_it_sta
     found = can_looking([replace(alone, rest=lambda: at_rest(can_truth))], sliver)
     assert_at(found, can_truth)
     assert isinstance(found, Found)
-    assert found.hypothesis.origin == "rest"
+    assert found.hypothesis.origin == "stillness"
     assert found.confidence > by_itself.confidence
     assert np.degrees(by_itself.hypothesis.refined.T_cam_obj.angle_to_rad(can_truth)) > 3
 
@@ -287,4 +287,4 @@ def test_what_stands_elsewhere_does_not_hold_a_pose_that_explains_more(
     for rest in (lambda: None, lambda: at_rest(aside)):
         found = can_looking([replace(look, rest=rest)], sliver)
         assert isinstance(found, Found)
-        assert found.hypothesis.origin != "rest"
+        assert found.hypothesis.origin != "stillness"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from reference.onboard import onboard, read_reference_frames
-from tracker import belief
+from tracker import belief, track
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError
@@ -207,6 +207,48 @@ def test_what_is_pointed_out_elsewhere_is_not_believed_to_be_where_it_was(
     assert (result.state, result.pose) == (TrackState.INITIALISING, None)
     tracker.point_out(CAN, middle_of(can_frames[2].masks[CAN]))
     assert tracker.step(bare(can_frames[2]))[0].state is TrackState.TRACKING
+
+
+@pytest.mark.parametrize(("away", "remembered"), [(2, True), (3, False)])
+def test_how_it_looked_is_forgotten_where_it_was_long_away(
+    away: int, remembered: bool, can_model: ConceptModel, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(track, "SO_LONG", 3)
+    tracker, nothing = ObjectTracker(can_model), np.zeros_like(can_frames[0].masks[CAN])
+    for k, frame in enumerate(can_frames[: 3 + away]):
+        (result,) = tracker.step(frame if k < 2 or k == 2 + away else replace(frame, masks={CAN: nothing}))
+    assert result.state is TrackState.TRACKING
+    assert all((found.usual is not None) == remembered for found in tracker.attempt(CAN).tried)
+
+
+def test_how_it_looked_is_forgotten_where_somebody_points(can_model: ConceptModel, can_frames: list[Frame]) -> None:
+    tracker = ObjectTracker(can_model, CARRIED)
+    tracker.step(can_frames[0])
+    tracker.point_out(CAN, middle_of(can_frames[1].masks[CAN]))
+    tracker.step(bare(can_frames[1]))
+    tried = tracker.attempt(CAN).tried
+    assert tried
+    assert all(found.usual is None for found in tried)
+
+
+@pytest.mark.parametrize("prior", [True, False])
+def test_what_is_mostly_hidden_is_held_by_where_it_stood_where_there_is_a_prior(
+    prior: bool, table_scene: SyntheticScene, table_models: dict[str, ConceptModel]
+) -> None:
+    """Past a camera that is carried around."""
+    name = "tea_box"
+    tracker = ObjectTracker(table_models[name], TrackerConfig(prior=prior))
+    for frame in (table_scene[index] for index in range(10, 15)):
+        assert tracker.step(frame)[0].state is TrackState.TRACKING
+    frame = table_scene[15]
+    mask, depth_m = frame.masks[name], frame.depth_m.copy()
+    columns = np.flatnonzero(mask.any(axis=0))
+    shown = mask & (np.arange(mask.shape[1]) < columns[0] + len(columns) // 4)
+    depth_m[mask & ~shown] *= np.float32(0.7)
+    (result,) = tracker.step(replace(frame, masks={name: shown}, depth_m=depth_m))
+    assert (result.reason == "found by stillness") == prior
+    if prior:
+        assert_near(result.pose, table_scene.sightings(name)[15].T_cam_obj)
 
 
 def test_nobody_points_where_every_frame_has_a_mask(can_model: ConceptModel) -> None:

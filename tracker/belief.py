@@ -18,7 +18,7 @@ LEAST_ENDS, LEAST_PROVED, MOST_HIDDEN = 0.7, 0.5, 0.5
 # in a row.
 MOST_CONTRADICTED, MOST_OUTSIDE, MOST_SEEN_THROUGH_AGAIN, MOST_GOES_ON = 0.15, 0.2, 0.05, 0.4
 # What is seen again has to look as it did while it was followed: of 130 right returns in rendered scenes none agreed
-# less in colour, and one of a hundred was contradicted more; of 7 wrong ones 6 were out by one of the two.
+# less in colour, and two were contradicted more; of 7 wrong ones 6 were out by one of the two.
 AS_COLOURED, MORE_CONTRADICTED = 0.75, 0.09
 AS_EXPLAINED = 0.6  # of what is found out of nowhere: in the place where it was, more of it may be hidden than usual
 MOST_DOUBTFUL = 3  # frames in a row in which what is followed may go beyond them

@@ -104,7 +104,7 @@ class Looking:
         found = None if isinstance(best, str) else best
         if look.rest is None or (found and found.grounds.turn_sigma_rad < self._config.unsure_rad):
             return best
-        with clock("rest"):
+        with clock("camera motion"):
             resting = look.rest()
         if resting is None:
             return best

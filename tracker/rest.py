@@ -19,8 +19,8 @@ from tracker.refinement import Refined
 from tracker.symmetry import Symmetry
 
 KEPT = 10  # frames
-# A right pose errs by about four times what noise alone makes of it (YCB-V replay `hard`, a recording), and by no less
-# than a share of a degree; the camera's motion comes on top.
+# A right pose errs by three to five times what noise alone makes of it (YCB-V replay `hard`, a recording), and by more
+# than nothing where that is next to nothing; the camera's motion comes on top.
 BIAS = 4.0
 LEAST = np.diag([0.01**2] * 3 + [0.001**2] * 3)  # covariances of (turn, radians; shift, metres)
 CAMERA = np.diag([0.015**2] * 3 + [0.0015**2] * 3)

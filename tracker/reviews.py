@@ -42,9 +42,8 @@ class SecondLook:
         self, looks: Iterable[Look | str], places: Places | None, now: Moment, followed: bool
     ) -> Asking[Found | None]:
         """What is believed of what the looks find, or, where that is nothing, a search of the places; or None."""
-        by_itself = [
-            look if isinstance(look, str) else replace(look, rest=None) for look in looks
-        ]  # it is another frame
+        # Where it stood can be asked in its own frame alone.
+        by_itself = [look if isinstance(look, str) else replace(look, rest=None) for look in looks]
         found = yield from self._look.best(by_itself, now.frame, now.clock)
         if places is not None and not believed(found, followed, self._config):
             found = yield from places.anywhere(now, self._look)

@@ -45,7 +45,8 @@ class Sight:
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
     """A refined pose, the evidence for it, and where the search for it began: concepts, prediction, search, turn, of
-    another pose about its axis, or rest, where it is if it stands still. view: the pixels by which it was judged."""
+    another pose about its axis, or stillness, where it is if it stands still. view: the pixels by which it was
+    judged."""
 
     refined: Refined
     evidence: Evidence
@@ -89,7 +90,7 @@ class Search:
     def held(self, refined: Refined | None, resting: Resting, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
         """The pose, as sure as the picture leaves it, held by where it is if it stands still."""
         with clock("verification"):
-            return self._judged(resting.held(refined, self._model.symmetry), sight, "rest")
+            return self._judged(resting.held(refined, self._model.symmetry), sight, "stillness")
 
     def _correspondences(self, cloud: PointCloud, clock: Stopwatch) -> Correspondences:
         """Which of the cloud's points is which point of the model? Of the last cloud they are kept."""
