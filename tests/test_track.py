@@ -215,9 +215,11 @@ def test_how_it_looked_is_forgotten_where_it_was_long_away(
 ) -> None:
     monkeypatch.setattr(track, "SO_LONG", 3)
     tracker, nothing = ObjectTracker(can_model), np.zeros_like(can_frames[0].masks[CAN])
-    for k, frame in enumerate(can_frames[: 3 + away]):
-        (result,) = tracker.step(frame if k < 2 or k == 2 + away else replace(frame, masks={CAN: nothing}))
-    assert result.state is TrackState.TRACKING
+    frames = can_frames[: 3 + away]
+    shown = [
+        frame if k < 2 or k == 2 + away else replace(frame, masks={CAN: nothing}) for k, frame in enumerate(frames)
+    ]
+    assert [tracker.step(frame)[0] for frame in shown][-1].state is TrackState.TRACKING
     assert all((found.usual is not None) == remembered for found in tracker.attempt(CAN).tried)
 
 
