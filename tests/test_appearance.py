@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracker.appearance import model_appearance, view_appearance
+from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
 from tracker.frame import Frame
 from tracker.geometry import Floats, Intrinsics, Pose
@@ -63,15 +63,16 @@ def spread(lab: Floats) -> float:
 def test_what_surrounds_the_object_does_not_colour_it() -> None:
     view = square_view()
     loud = replace(view, rgb=np.where(view.inside[:, :, None], view.rgb, np.array((255, 0, 0), np.float32)))
-    quiet, loud_too = view_appearance(view), view_appearance(loud)
-    for level in (0, 1):
-        assert np.allclose(quiet.lab[level][view.inside], loud_too.lab[level][view.inside], atol=1e-4)
-        assert np.allclose(quiet.gradient[level], loud_too.gradient[level], atol=1e-4)
+    quiet, loud_too = ViewAppearance(view), ViewAppearance(loud)
+    for one, other in ((quiet.fine, loud_too.fine), (quiet.coarse, loud_too.coarse)):
+        assert np.allclose(one.lab[view.inside], other.lab[view.inside], atol=1e-4)
+        assert np.allclose(one.gradient, other.gradient, atol=1e-4)
 
 
 def test_the_fine_level_is_nearly_the_picture_and_the_coarse_one_is_smoother() -> None:
     view = square_view()
-    fine, coarse = (lab[view.inside] for lab in view_appearance(view).lab)
+    appearance = ViewAppearance(view)
+    fine, coarse = (level.lab[view.inside] for level in (appearance.fine, appearance.coarse))
     plain = lab_of(view.rgb)[view.inside]
     assert np.abs(fine - plain).mean() < 0.3 * np.abs(coarse - plain).mean()
     assert spread(coarse) < 0.8 * spread(fine) < 0.8 * spread(plain)
@@ -79,10 +80,11 @@ def test_the_fine_level_is_nearly_the_picture_and_the_coarse_one_is_smoother() -
 
 def test_gradients_are_the_change_of_lab_a_pixel_along_columns_then_rows() -> None:
     view = square_view()
-    appearance = view_appearance(view)
+    appearance = ViewAppearance(view)
     inner = np.zeros_like(view.inside)
     inner[8:-8, 8:-8] = view.inside[8:-8, 8:-8]
-    for lab, gradient in zip(appearance.lab, appearance.gradient, strict=True):
+    for level in (appearance.fine, appearance.coarse):
+        lab, gradient = level.lab, level.gradient
         assert np.allclose(gradient[inner][:, :3], np.gradient(lab, axis=1)[inner], atol=1e-4)
         assert np.allclose(gradient[inner][:, 3:], np.gradient(lab, axis=0)[inner], atol=1e-4)
         assert np.abs(gradient[inner]).max() > 1
@@ -90,10 +92,10 @@ def test_gradients_are_the_change_of_lab_a_pixel_along_columns_then_rows() -> No
 
 def test_there_is_no_gradient_across_the_border_of_the_object() -> None:
     view = square_view()
-    appearance = view_appearance(view)
+    appearance = ViewAppearance(view)
     left = view.inside & ~np.roll(view.inside, 1, axis=1)
     top = view.inside & ~np.roll(view.inside, 1, axis=0)
-    for gradient in appearance.gradient:
+    for gradient in (appearance.fine.gradient, appearance.coarse.gradient):
         assert (gradient[~view.inside & ~np.roll(view.inside, -1, 1) & ~np.roll(view.inside, 1, 1)][:, :3] == 0).all()
         assert (gradient[left][:, :3] == 0).all()
         assert (gradient[top][:, 3:] == 0).all()
@@ -101,23 +103,25 @@ def test_there_is_no_gradient_across_the_border_of_the_object() -> None:
 
 def test_the_fine_level_of_a_model_is_its_own_colours() -> None:
     model = square_model()
-    assert np.allclose(model_appearance(model, ACROSS).lab[0], lab_of(model.colours[None])[0], atol=1e-5)
+    assert np.allclose(model_appearance(model, ACROSS).fine, lab_of(model.colours[None])[0], atol=1e-5)
 
 
 def test_a_model_of_one_colour_keeps_it() -> None:
     model = square_model()
     plain = replace(model, colours=np.full_like(model.colours, 90))
-    for lab in model_appearance(plain, ACROSS).lab:
+    appearance = model_appearance(plain, ACROSS)
+    for lab in (appearance.fine, appearance.coarse):
         assert np.allclose(lab, lab[0], atol=1e-4)
 
 
 def test_view_and_model_are_smoothed_alike() -> None:
     view, model = square_view(), square_model()
-    of_view, of_model = view_appearance(view), model_appearance(model, ACROSS)
+    of_view, of_model = ViewAppearance(view), model_appearance(model, ACROSS)
     at = project(model.points, model.normals, Pose(np.eye(3), np.array([0, 0, DEPTH_M])), view.camera)
     inner = np.abs(model.points[:, :2]).max(axis=1) < 0.35 * SIDE_M  # at a border the neighbourhoods differ
-    seen = [interpolate(lab, at.columns[inner], at.rows[inner]) for lab in of_view.lab]
-    known = [lab[inner] for lab in of_model.lab]
+    levels = of_view.fine, of_view.coarse
+    seen = [interpolate(level.lab, at.columns[inner], at.rows[inner]) for level in levels]
+    known = [lab[inner] for lab in (of_model.fine, of_model.coarse)]
     difference = [[float(np.abs(s - k).mean()) for k in known] for s in seen]
     assert difference[0][0] < 0.4 * difference[0][1]
     assert difference[1][1] < 0.3 * difference[1][0]
@@ -125,9 +129,10 @@ def test_view_and_model_are_smoothed_alike() -> None:
 
 def test_a_model_of_which_a_view_has_more_pixels_is_smoothed_less() -> None:
     model = square_model()
-    fine, coarse = model_appearance(model, ACROSS).lab
-    sharper = model_appearance(model, 2 * ACROSS).lab[1]
-    sharpest = model_appearance(model, 20 * ACROSS).lab[1]
+    appearance = model_appearance(model, ACROSS)
+    fine, coarse = appearance.fine, appearance.coarse
+    sharper = model_appearance(model, 2 * ACROSS).coarse
+    sharpest = model_appearance(model, 20 * ACROSS).coarse
     assert np.abs(sharper - fine).mean() < 0.7 * np.abs(coarse - fine).mean()
     assert np.allclose(sharpest, fine, atol=1e-3)
 
@@ -138,12 +143,12 @@ def test_colours_do_not_mix_through_a_thin_wall() -> None:
     points = np.vstack((front.points, front.points + np.array((0, 0, 0.001))))
     normals = np.vstack((front.normals, -front.normals))
     colours = np.repeat([(200.0, 20, 20), (20, 160, 60)], len(front), axis=0)
-    fine, coarse = model_appearance(model_of(points, normals, colours), ACROSS).lab
-    assert np.allclose(fine, coarse, atol=1e-3)
+    appearance = model_appearance(model_of(points, normals, colours), ACROSS)
+    assert np.allclose(appearance.fine, appearance.coarse, atol=1e-3)
 
 
 def test_a_model_of_fewer_points_than_a_neighbourhood_is_smoothed_over_all_of_them() -> None:
     model = square_model()
     few = model_of(model.points[:5] * 1e-6, model.normals[:5], model.colours[:5])
-    fine, coarse = model_appearance(few, ACROSS).lab
-    assert np.allclose(coarse, fine.mean(axis=0), atol=1e-3)
+    appearance = model_appearance(few, ACROSS)
+    assert np.allclose(appearance.coarse, appearance.fine.mean(axis=0), atol=1e-3)

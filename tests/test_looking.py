@@ -142,7 +142,7 @@ def test_where_concepts_lead_astray_what_surface_and_colours_lead_to_is_kept(
     can_looking: Counted, can_frames: list[Frame], can_truth: Pose, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In a surprising turn, so that they were asked."""
-    monkeypatch.setattr(Search, "near", lambda *_: [])
+    monkeypatch.setattr(Search, "near", lambda *_, **__: [])
     monkeypatch.setattr(Search, "anywhere", lambda *_: [])
     tilted = can_truth.nudged(np.array((0.16, 0.05, 0, 0, 0, 0)))
     assert_at(can_looking([Look(can_frames[0].masks[CAN], tilted, (tilted,), masked=True)], can_frames[0]), can_truth)
@@ -261,7 +261,7 @@ def test_a_pose_that_hardly_anything_is_seen_of_is_held_by_where_it_is_if_it_sta
     alone = Look(sliver.masks[CAN], near, (near,), masked=True)
     by_itself = can_looking([alone], sliver)
     assert isinstance(by_itself, Found)
-    found = can_looking([replace(alone, rest=lambda: at_rest(can_truth))], sliver)
+    found = can_looking([replace(alone, rest=lambda *_: at_rest(can_truth))], sliver)
     assert_at(found, can_truth)
     assert isinstance(found, Found)
     assert found.hypothesis.origin == "stillness"
@@ -272,7 +272,7 @@ def test_a_pose_that_hardly_anything_is_seen_of_is_held_by_where_it_is_if_it_sta
 def test_a_pose_that_is_sure_is_not_asked_whether_it_stands_still(
     can_looking: Counted, can_frames: list[Frame], can_truth: Pose
 ) -> None:
-    def rest() -> Resting:
+    def rest(*_: object) -> Resting:
         raise AssertionError("asked")
 
     look = Look(can_frames[0].masks[CAN], can_truth, (can_truth,), masked=True, rest=rest)
@@ -284,7 +284,7 @@ def test_what_stands_elsewhere_does_not_hold_a_pose_that_explains_more(
 ) -> None:
     look = Look(sliver.masks[CAN], can_truth, (can_truth,), masked=True)
     aside = can_truth.nudged(np.array((0, 0, 0, 0.02, 0, 0)))
-    for rest in (lambda: None, lambda: at_rest(aside)):
+    for rest in (lambda *_: None, lambda *_: at_rest(aside)):
         found = can_looking([replace(look, rest=rest)], sliver)
         assert isinstance(found, Found)
         assert found.hypothesis.origin != "stillness"

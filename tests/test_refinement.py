@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tracker.appearance import view_appearance
+from tracker.appearance import ViewAppearance
 from tracker.concept import ConceptModel
 from tracker.frame import Frame
 from tracker.geometry import Pose
@@ -34,7 +34,7 @@ def off(seed: int, angle_deg: float, distance_m: float) -> np.ndarray:
 
 
 def refined(model: ConceptModel, start: Pose, view: ObjectView, config: RefinementConfig = CONFIG) -> Refined | None:
-    return Refiner(model, config, ACROSS)(start, view, view_appearance(view))
+    return Refiner(model, config, ACROSS)(start, view, ViewAppearance(view))
 
 
 def errors(found: Refined | None, truth: Pose) -> tuple[float, float]:
@@ -198,6 +198,20 @@ def test_the_evidence_says_how_far_and_how_many(can_model: ConceptModel, can_vie
     far = refined(can_model, shifted, can_view, once)
     assert far is not None
     assert far.residual_m > 3 * near.residual_m
+
+
+def test_what_has_settled_takes_no_more_steps_and_what_has_not_takes_all(
+    can_model: ConceptModel, can_view: ObjectView, can_truth: Pose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = []
+    linearise = Refiner._linearise
+    monkeypatch.setattr(Refiner, "_linearise", lambda *given: steps.append(1) or linearise(*given))
+    patient = RefinementConfig(coarse_settled_px=0, fine_settled_px=0)
+    assert errors(refined(can_model, can_truth, can_view, patient), can_truth)[0] < 0.5
+    assert len(steps) == patient.coarse_steps + patient.fine_steps
+    steps.clear()
+    assert errors(refined(can_model, can_truth, can_view), can_truth)[0] < 0.5
+    assert len(steps) < 6
 
 
 def test_a_model_that_meets_too_few_of_the_objects_pixels_is_not_refined(

@@ -70,10 +70,15 @@ def followed(camera: Moves, *moves: Pose, sigmas_rad: tuple[float, ...] = ()) ->
 STILL = Pose.identity()
 
 
+def camera_pose(camera: Moves) -> Pose:
+    assert camera.T_now_world is not None
+    return camera.T_now_world
+
+
 def test_it_is_where_the_camera_s_motion_leaves_it_about_as_surely_as_it_was(camera: Moves) -> None:
     rest = followed(camera, STILL, STILL)
     camera.step(MOVED)
-    found = rest.now(camera)
+    found = rest.now(camera, None, PLAIN)
     assert found is not None
     assert camera.T_now_world is not None
     assert found.T_cam_obj.matrix == pytest.approx((camera.T_now_world @ POSE).matrix, abs=1e-9)
@@ -85,23 +90,37 @@ def test_it_is_where_the_camera_s_motion_leaves_it_about_as_surely_as_it_was(cam
 def test_of_the_last_frames_the_surest_counts(camera: Moves) -> None:
     off = Pose.exp(np.array((0.01, 0, 0, 0, 0, 0)))
     rest = followed(camera, STILL, off, off.inverse(), sigmas_rad=(0.02, 0.002, 0.02))
-    found = rest.now(camera)
+    found = rest.now(camera, None, PLAIN)
     assert found is not None
     assert camera.T_now_world is not None
     assert found.T_cam_obj.matrix == pytest.approx((camera.T_now_world @ off @ POSE).matrix, abs=1e-9)
 
 
 def test_nothing_is_known_of_what_was_seen_once_moves_or_was_seen_by_a_camera_that_is_lost(camera: Moves) -> None:
-    assert Rest().now(camera) is None
-    assert followed(camera, STILL).now(camera) is None
+    assert Rest().now(camera, None, PLAIN) is None
+    assert followed(camera, STILL).now(camera, None, PLAIN) is None
     turned, shifted = (Pose.exp(np.array(six)) for six in ((0.15, 0, 0, 0, 0, 0), (0, 0, 0, 0.015, 0, 0)))
     for move in (turned, shifted):
-        assert followed(camera, STILL, move).now(camera) is None
+        assert followed(camera, STILL, move).now(camera, None, PLAIN) is None
     slowly = Pose.exp(np.array((0, 0.015, 0, 0, 0, 0)))  # 26 degrees a second
-    assert followed(camera, *[slowly] * 10, sigmas_rad=(0.001, *[0.002] * 9)).now(camera) is None
+    assert followed(camera, *[slowly] * 10, sigmas_rad=(0.001, *[0.002] * 9)).now(camera, None, PLAIN) is None
     rest = followed(camera, STILL, STILL)
     camera.T_now_world = None
-    assert rest.now(camera) is None
+    assert rest.now(camera, None, PLAIN) is None
+
+
+def test_what_is_seen_where_it_was_need_not_be_looked_for_in_a_frame_more(camera: Moves) -> None:
+    """Turned by half a turn it is seen as it was, too. What is seen elsewhere may still be still: it may be hidden."""
+    moving = followed(camera, STILL, Pose.exp(np.array((0.15, 0, 0, 0, 0, 0))), STILL, sigmas_rad=(0.001, 0.002, 0.002))
+    assert moving.now(camera, None, HALF) is None
+    there = moving.now(camera, refined(camera_pose(camera) @ POSE, 0.02), HALF)
+    assert there is not None
+    half = Pose(np.diag((-1.0, -1.0, 1.0)), np.zeros(3))
+    assert moving.now(camera, refined(there.T_cam_obj @ half, 0.02), HALF) is not None
+    assert moving.now(camera, refined(there.T_cam_obj @ half, 0.02), PLAIN) is None
+    still = followed(camera, STILL, STILL)
+    aside = refined(camera_pose(camera) @ POSE.nudged(np.array((0, 0.5, 0, 0, 0, 0))), 0.02)
+    assert still.now(camera, aside, PLAIN) is not None
 
 
 @given(turn=st.tuples(small, small, small), surer=st.floats(0.25, 4))

@@ -55,13 +55,15 @@ def test_near_the_prediction_nothing_is_sampled(
 ) -> None:
     clock = Stopwatch()
     near = can_truth.nudged(np.array((0.1, -0.05, 0.1, 0.005, -0.005, 0.01)))
-    assert_found(best(can_search.near(near, can_sight, can_cloud, clock)), can_truth, "concepts", "prediction")
+    assert_found(
+        best(can_search.near(near, can_sight, can_cloud, clock, by_surface=True)), can_truth, "concepts", "prediction"
+    )
     assert "registration" not in clock.timings_ms()
 
 
 def test_it_remembers_nothing(can_search: Search, can_sight: Sight, can_cloud: PointCloud, can_truth: Pose) -> None:
     first = can_search.anywhere(can_sight, can_cloud, Stopwatch())
-    can_search.near(can_truth, can_sight, can_cloud, Stopwatch())
+    can_search.near(can_truth, can_sight, can_cloud, Stopwatch(), by_surface=True)
     again = can_search.anywhere(can_sight, can_cloud, Stopwatch())
     for one, other in zip(first, again, strict=True):
         assert np.array_equal(one.refined.T_cam_obj.matrix, other.refined.T_cam_obj.matrix)

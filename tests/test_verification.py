@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tracker.appearance import view_appearance
+from tracker.appearance import ViewAppearance
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.frame import Frame
@@ -22,7 +22,7 @@ ACROSS = ViewConfig().pixels_across
 
 
 def judged(model: ConceptModel, T_cam_obj: Pose, view: ObjectView, config: VerificationConfig = CONFIG) -> Evidence:
-    return Verifier(model, config, ACROSS)(T_cam_obj, view, view_appearance(view))
+    return Verifier(model, config, ACROSS)(T_cam_obj, view, ViewAppearance(view))
 
 
 def seen(frame: Frame, model: ConceptModel) -> ObjectView:
@@ -218,7 +218,7 @@ def test_a_finer_view_explains_as_much(can_model: ConceptModel, can_frames: list
     views = [
         view_object(frame, mask, can_model.diameter_m, ViewConfig(pixels_across=n, least_pixels=0)) for n in (32, 64)
     ]
-    coarse, fine = (Verifier(can_model, CONFIG, 32)(can_truth, v, view_appearance(v)) for v in views if v is not None)
+    coarse, fine = (Verifier(can_model, CONFIG, 32)(can_truth, v, ViewAppearance(v)) for v in views if v is not None)
     assert fine.explained > 0.9 * coarse.explained > 0.8
 
 

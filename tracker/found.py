@@ -9,9 +9,11 @@ from typing import NamedTuple
 from tracker.confidence import Grounds
 from tracker.frame import Mask
 from tracker.geometry import Floats, Pose
+from tracker.refinement import Refined
 from tracker.rest import Resting
 from tracker.saliency import Saliency
 from tracker.search import Hypothesis
+from tracker.symmetry import Symmetry
 
 
 class Usual(NamedTuple):
@@ -36,7 +38,7 @@ class Look:
     place_m: Floats | None = None
     masked: bool = False
     contested: bool = False
-    rest: Callable[[], Resting | None] | None = None
+    rest: Callable[[Refined | None, Symmetry], Resting | None] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

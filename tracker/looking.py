@@ -104,11 +104,11 @@ class Looking:
         found = None if isinstance(best, str) else best
         if look.rest is None or (found and found.grounds.turn_sigma_rad < self._config.unsure_rad):
             return best
+        refined = found and found.hypothesis.refined
         with clock("camera motion"):
-            resting = look.rest()
+            resting = look.rest(refined, self._model.symmetry)
         if resting is None:
             return best
-        refined = found and found.hypothesis.refined
         hypothesis = self._search.held(refined, resting, sight, clock)
         if hypothesis is None:
             return best
@@ -137,7 +137,9 @@ class Looking:
         if len(cloud) < LEAST_POINTS:
             return best or f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
         if look.start is not None:
-            best = self._likeliest(best, self._search.near(look.start, sight, cloud, clock), look)
+            unclear = best is None or not self._clear(best)  # else the surface has said all that it can
+            near = self._search.near(look.start, sight, cloud, clock, by_surface=unclear)
+            best = self._likeliest(best, near, look)
         if look.start is None or (look.masked and (best is None or best.score < self._config.trust)):
             best = self._likeliest(best, self._search.anywhere(sight, cloud, clock), look)
         if best is None:

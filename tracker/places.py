@@ -19,6 +19,7 @@ from tracker.proposals import Proposals
 from tracker.refinement import Refined
 from tracker.rest import Rest, Resting
 from tracker.stopwatch import Stopwatch
+from tracker.symmetry import Symmetry
 from tracker.whereabouts import Whereabouts
 
 SAME_RAD, SAME_SHARE = 0.05, 0.03  # poses nearer than this angle and share of the diameter are looked at once
@@ -153,7 +154,7 @@ class Places:
         around = self._proposals.around((near[0] @ self._centre_m[None])[0], now.frame, MOVED_ON)
         yield Look(now.unclaimed(around), None, tuple(near))
 
-    def _resting(self, now: Moment) -> Callable[[], Resting | None] | None:
+    def _resting(self, now: Moment) -> Callable[[Refined | None, Symmetry], Resting | None] | None:
         """Of a tracker that knows of earlier frames."""
         return partial(self._rest.now, now.camera) if self._config.prior else None
 

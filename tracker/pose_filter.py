@@ -17,10 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from filterpy.kalman import KalmanFilter
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from tracker.geometry import Floats, Pose
+from tracker.geometry import Floats, Pose, rotation_vector
 
 START_SPEED_MPS, START_TURN_RADPS = 0.5, 2.0  # how fast an object may be when it is first seen
 LEVELS = np.array([1.0, 0.2, 0.04, 0.01])  # shares of the greatest acceleration that may be all there is
@@ -202,7 +201,7 @@ class PoseFilter:
 
 def deviation(T_cam_obj: Pose, origin: Pose) -> Floats:
     """(6,) turn and shift from one pose to another in camera axes: `origin.nudged` of it is the pose."""
-    turn = Rotation.from_matrix(T_cam_obj.rotation @ origin.rotation.T).as_rotvec()
+    turn = rotation_vector(T_cam_obj.rotation @ origin.rotation.T)
     return np.concatenate((turn, T_cam_obj.translation_m - origin.translation_m))
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from tracker.appearance import ViewAppearance, model_appearance
+from tracker.appearance import Smoothed, ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
 from tracker.geometry import Floats, Intrinsics, Pose
 from tracker.least_squares import MotionEquations, free_directions, moved, tukey
@@ -26,8 +26,9 @@ GAIN_RANGE = (0.6, 1.6)
 
 
 class RefinementConfig(BaseModel):
-    """model_points: how many take part. coarse_steps, fine_steps: iterations on smoothed and on fine colours.
-    depth_sigma_m: noise of the pooled depth; at the first step it is taken to be depth_sigma_start times that.
+    """model_points: how many take part. coarse_steps, fine_steps: iterations on smoothed and on fine colours, at most.
+    coarse_settled_px, fine_settled_px: a step that moves the object by less, in view pixels, is the last one of these.
+    depth_sigma_m: noise of the pooled depth; it is taken to be depth_sigma_coarse times that in the coarse steps.
     lab_sigma: least noise assumed in colour. colour_weight: of the colour terms against the depth term.
     offset_information: how surely colour and depth are registered, in inverse squared view pixels."""
 
@@ -35,9 +36,11 @@ class RefinementConfig(BaseModel):
 
     model_points: int = Field(default=1000, ge=50)
     coarse_steps: int = Field(default=4, ge=0)
-    fine_steps: int = Field(default=4, ge=1)
+    fine_steps: int = Field(default=8, ge=1)
+    coarse_settled_px: float = Field(default=0.5, ge=0)
+    fine_settled_px: float = Field(default=0.1, ge=0)
     depth_sigma_m: float = Field(default=0.0015, gt=0)
-    depth_sigma_start: float = Field(default=2.7, ge=1)
+    depth_sigma_coarse: float = Field(default=2.0, ge=1)
     lab_sigma: float = Field(default=2.0, gt=0)
     colour_weight: float = Field(default=1.0, ge=0)
     offset_information: float = Field(default=30.0, ge=0)
@@ -69,6 +72,16 @@ class Refined:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Level:
+    """lab: (3, N) of the points that are aligned. sigma_m: of depth. settled_m: see `RefinementConfig`."""
+
+    lab: Floats
+    steps: int
+    sigma_m: float
+    settled_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Linearised:
     matrix: Floats
     vector: Floats
@@ -83,35 +96,39 @@ class Refiner:
         appearance = model_appearance(model, pixels_across)
         chosen = np.random.default_rng(0).permutation(len(model))[: config.model_points]
         self._points, self._normals = model.points[chosen], model.normals[chosen]
-        self._lab = tuple(np.ascontiguousarray(lab[chosen].T, np.float32) for lab in appearance.lab)
+        coarse, fine = (np.ascontiguousarray(lab[chosen].T, np.float32) for lab in (appearance.coarse, appearance.fine))
+        sigma_m, pixel_m = config.depth_sigma_m, model.diameter_m / pixels_across
+        smoothed_sigma_m = config.depth_sigma_coarse * sigma_m
+        self._levels = (
+            _Level(coarse, config.coarse_steps, smoothed_sigma_m, config.coarse_settled_px * pixel_m),
+            _Level(fine, config.fine_steps, sigma_m, config.fine_settled_px * pixel_m),
+        )
 
     def __call__(self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance) -> Refined | None:
         """None where too few model points meet the object's pixels."""
-        config = self._config
-        sigmas_m = config.depth_sigma_m * np.geomspace(
-            config.depth_sigma_start, 1, config.coarse_steps + config.fine_steps
-        )
-        levels = (1,) * config.coarse_steps + (0,) * config.fine_steps
         linear = None
-        for sigma_m, level in zip(sigmas_m, levels, strict=True):
-            linear = self._linearise(T_cam_obj, view, appearance, float(sigma_m), level)
-            if linear is None:
-                return None
-            T_cam_obj = moved(T_cam_obj, linear.matrix, linear.vector)
+        for level, colours in zip(self._levels, (appearance.coarse, appearance.fine), strict=True):
+            for _ in range(level.steps):
+                linear = self._linearise(T_cam_obj, view, colours, level)
+                if linear is None:
+                    return None
+                before, T_cam_obj = T_cam_obj, moved(T_cam_obj, linear.matrix, linear.vector)
+                moved_m = T_cam_obj.distance_to_m(before) + T_cam_obj.angle_to_rad(before) * self._radius_m
+                if moved_m < level.settled_m:
+                    break
         if linear is None:
             return None
         free = free_directions(linear.matrix, self._radius_m)
         residual_m = float(np.median(np.abs(linear.residuals_m)))
         return Refined(T_cam_obj, linear.matrix, free, residual_m, len(linear.residuals_m))
 
-    def _linearise(
-        self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance, sigma_m: float, level: int
-    ) -> _Linearised | None:
+    def _linearise(self, T_cam_obj: Pose, view: ObjectView, colours: Smoothed, level: _Level) -> _Linearised | None:
         at = project(self._points, self._normals, T_cam_obj, view.camera)
         usable = np.flatnonzero(at.within(view.camera, 2) & (at.facing > FACING_LEAST))
         rows, columns = (pixels[usable] for pixels in nearest_pixels(at, view.camera))
         measured_m = view.depth_m[rows, columns].astype(np.float64)
-        met = view.has_depth[rows, columns] & (np.abs(measured_m - at.points_cam[usable, 2]) < 6 * sigma_m + 0.004)
+        near = np.abs(measured_m - at.points_cam[usable, 2]) < 6 * level.sigma_m + 0.004
+        met = view.has_depth[rows, columns] & near
         usable, rows, columns, measured_m = usable[met], rows[met], columns[met], measured_m[met]
         if len(usable) < LEAST_POINTS:
             return None
@@ -119,11 +136,11 @@ class Refiner:
         arms = points - T_cam_obj.translation_m
         residual_m = ((view.camera.unproject(columns, rows, measured_m) - points) * normals).sum(axis=1)
         equations = MotionEquations()
-        equations.add(arms, normals, residual_m, facing * tukey(residual_m, 4 * sigma_m) / sigma_m**2)
+        equations.add(arms, normals, residual_m, facing * tukey(residual_m, 4 * level.sigma_m) / level.sigma_m**2)
 
-        seen = np.ascontiguousarray(interpolate(appearance.lab[level], at.columns[usable], at.rows[usable]).T)
-        gradient = np.ascontiguousarray(appearance.gradient[level][rows, columns].T).reshape(2, 3, -1)
-        residual, weights = self._colour_residuals(seen, self._lab[level][:, usable], facing)
+        seen = np.ascontiguousarray(interpolate(colours.lab, at.columns[usable], at.rows[usable]).T)
+        gradient = np.ascontiguousarray(colours.gradient[rows, columns].T).reshape(2, 3, -1)
+        residual, weights = self._colour_residuals(seen, level.lab[:, usable], facing)
         weighted = weights * gradient
         structure = np.stack([(weighted[i] * gradient[j]).sum(axis=0) for i, j in ((0, 0), (0, 1), (1, 1))])
         pull = (weighted * residual).sum(axis=1)
@@ -138,12 +155,11 @@ class Refiner:
         robust, residual, sigma = facing * np.ones_like(seen), expected - seen, np.ones_like(seen[:, :1])
         for _ in range(2):
             share = robust / (robust.sum(axis=1, keepdims=True) + 1e-9)
-            mean_seen = (share * seen).sum(axis=1, keepdims=True)
-            centred = expected - (share * expected).sum(axis=1, keepdims=True)
+            mean_seen = np.vecdot(share, seen)[:, None]
+            centred = expected - np.vecdot(share, expected)[:, None]
             leaning = share * centred
-            variance = (leaning * centred).sum(axis=1, keepdims=True)
-            together = (leaning * (seen - mean_seen)).sum(axis=1, keepdims=True)
-            gain = np.clip((together + PLAIN_VARIANCE) / (variance + PLAIN_VARIANCE), *GAIN_RANGE)
+            variance, together = np.vecdot(leaning, centred), np.vecdot(leaning, seen - mean_seen)
+            gain = np.clip((together + PLAIN_VARIANCE) / (variance + PLAIN_VARIANCE), *GAIN_RANGE)[:, None]
             residual = gain * centred + mean_seen - seen
             middle = residual.shape[1] // 4  # of half of them: their median takes the most time here
             spread = np.partition(np.abs(residual[:, ::2]), middle, axis=1)[:, middle : middle + 1]

@@ -67,14 +67,17 @@ class Rest:
         """In this frame, by what the picture shows."""
         self._kept.append((camera.now, _measured(refined)))
 
-    def now(self, camera: CameraMotion) -> Resting | None:
-        """In this frame; None where it is not known, or has moved of late."""
+    def now(self, camera: CameraMotion, seen: Refined | None, symmetry: Symmetry) -> Resting | None:
+        """In this frame; None where it is not known, or has moved of late. seen: what the picture says of it. It is not
+        asked of another frame, which takes a while, whether an object moves that is seen where it was."""
         if len(self._kept) < 2:
             return None
         surest = min(self._kept, key=lambda kept: np.linalg.slogdet(kept[1].covariance)[1])
-        latest = self._kept[-1] if self._kept[-1] is not surest else self._kept[-2]
-        resting, again = (_carried(*kept, camera) for kept in (surest, latest))
-        return resting if resting and again and resting.agrees(again, STILL) else None
+        resting = _carried(*surest, camera)
+        if resting is None or (seen and resting.agrees(_measured(seen.nearest(resting.T_cam_obj, symmetry)), STILL)):
+            return resting
+        again = _carried(*(self._kept[-1] if self._kept[-1] is not surest else self._kept[-2]), camera)
+        return resting if again and resting.agrees(again, STILL) else None
 
 
 def _carried(then: Landmarks | None, resting: Resting, camera: CameraMotion) -> Resting | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from tracker.appearance import ViewAppearance, view_appearance
+from tracker.appearance import ViewAppearance
 from tracker.closest_points import ClosestPoints
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
@@ -39,7 +39,7 @@ class Sight:
 
     @classmethod
     def of(cls, view: ObjectView, *, masked: bool) -> Sight:
-        return cls(view, view_appearance(view), masked)
+        return cls(view, ViewAppearance(view), masked)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,14 +76,16 @@ class Search:
         """The pose that surface and colours lead to from the prediction, without any concept."""
         return self._refined(predicted, sight, "prediction", clock)
 
-    def near(self, predicted: Pose, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> list[Hypothesis]:
-        """Two poses near the prediction, or one: pulled by the concepts first, and by surfaces alone."""
+    def near(
+        self, predicted: Pose, sight: Sight, cloud: PointCloud, clock: Stopwatch, *, by_surface: bool
+    ) -> list[Hypothesis]:
+        """Poses near the prediction, two at most: pulled by the concepts first, and by_surface alone too."""
         correspondences = self._correspondences(cloud, clock)
         with clock("closest points"):
             pulled = self._closest.align(self._closest.pull(predicted, correspondences, cloud), cloud)
-            direct = self._closest.align(predicted, cloud)
+            direct = self._closest.align(predicted, cloud) if by_surface else None
         found = [self._refined(pulled, sight, "concepts", clock)]
-        if not (direct and pulled and self._alike(direct, pulled)):
+        if direct and not (pulled and self._alike(direct, pulled)):
             found.append(self._refined(direct, sight, "prediction", clock))
         return [hypothesis for hypothesis in found if hypothesis]
 
@@ -163,6 +165,6 @@ class Search:
             own = view_object(view.frame, mask, self._model.diameter_m, self._config.view)
             if own is None:
                 return None
-            view, appearance = own, view_appearance(own)
+            view, appearance = own, ViewAppearance(own)
         evidence = self._verify(refined.T_cam_obj, view, appearance, around=not sight.masked)
         return Hypothesis(refined, evidence, origin, view)

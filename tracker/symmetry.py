@@ -76,7 +76,8 @@ class Symmetry:
         """
         if self.trivial:
             return T_cam_obj
-        between = Rotation.from_matrix(to.rotation.T @ T_cam_obj.rotation @ self.turns).as_quat(scalar_first=True)
+        between = Rotation.from_matrix(to.rotation.T @ T_cam_obj.rotation @ self.turns, assume_valid=True)
+        between = between.as_quat(scalar_first=True)
         twist = between[:, 1:] @ self.axis if self.axis is not None else np.zeros(len(between))
         cosine = np.hypot(between[:, 0], twist)
         k = 0 if cosine[0] > cosine.max() - TIE else int(cosine.argmax())

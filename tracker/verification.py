@@ -76,7 +76,7 @@ class Verifier:
         self._config, self._diameter_m, self._pixels_across = config, model.diameter_m, pixels_across
         chosen = evenly(model.points, config.model_points)
         self._points, self._normals = model.points[chosen], model.normals[chosen]
-        self._lab = model_appearance(model, pixels_across).lab[0][chosen]
+        self._lab = model_appearance(model, pixels_across).fine[chosen]
         self._most = _most_shown(self._normals)
         self._sigma_m = max(config.depth_sigma * model.diameter_m, config.depth_sigma_least_m)
 
@@ -103,7 +103,7 @@ class Verifier:
             return NOTHING_SEEN
         in_place = due & on_object & (measured_m > 0) & (np.abs(behind_m) < reach_m)
         surface = weights * in_place * np.exp(-0.5 * (behind_m / self._sigma_m) ** 2)
-        apart, usual = colours_apart(appearance.lab[0][rows, columns], self._lab, self._normals, in_place)
+        apart, usual = colours_apart(appearance.fine.lab[rows, columns], self._lab, self._normals, in_place)
         colour = usual * np.exp(-0.5 * (apart / self._config.lab_sigma) ** 2)
         met = max(float(surface.sum()), 1e-9)
         agreed = float((surface * colour**self._config.colour_share).sum() / total)
@@ -119,7 +119,7 @@ class Verifier:
             hidden=float((at.facing * hidden).sum() / (at.facing * faces).sum()),
             explained=explained,
             proved=float(weights[in_place].sum() / self._most),
-            goes_on=goes_on(*met_px, appearance.lab[0], view, finer) if around else 0.0,
+            goes_on=goes_on(*met_px, appearance.fine.lab, view, finer) if around else 0.0,
         )
 
 

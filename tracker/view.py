@@ -134,12 +134,21 @@ def _pool_depth(depth_m: Float32s, measured: Mask, block: int, tolerance_m: floa
     """
     if block == 1:
         return np.where(measured, depth_m, np.float32(0))
-    values = np.sort(np.where(_blocks(measured, block), _blocks(depth_m, block), np.float32(np.inf)), axis=2)
-    count = np.isfinite(values).sum(axis=2)
-    median = np.take_along_axis(values, np.maximum(count - 1, 0)[:, :, None] // 2, axis=2)
-    near = np.abs(values - np.where(count[:, :, None] > 0, median, 0)) < tolerance_m
-    mean = np.where(near, values, 0).sum(axis=2) / np.maximum(near.sum(axis=2), 1)
+    known, depth_m = _blocks(measured, block), _blocks(depth_m, block)
+    count = np.count_nonzero(known, axis=2)
+    mean = np.where(known, depth_m, np.float32(0)).sum(axis=2) / np.maximum(count, 1)
+    nearest, farthest = (np.where(known, depth_m, np.float32(none)) for none in (np.inf, -np.inf))
+    torn = farthest.max(axis=2) - nearest.min(axis=2) >= tolerance_m  # few are, and medians take long
+    mean[torn] = _mean_about_median(nearest[torn], count[torn], tolerance_m)
     return np.where(count >= 0.25 * block * block, mean, 0).astype(np.float32)
+
+
+def _mean_about_median(values: Float32s, count: npt.NDArray[np.intp], tolerance_m: float) -> Floats:
+    """Of each row of values (N, K), infinite where there are none, the mean of those within tolerance of the median of
+    as many as `count` (N,) says."""
+    median = np.take_along_axis(np.sort(values, axis=1), (count[:, None] - 1) // 2, axis=1)
+    near = np.abs(values - median) < tolerance_m
+    return np.where(near, values, 0).sum(axis=1) / near.sum(axis=1)
 
 
 def _blocks(array: npt.NDArray, block: int) -> npt.NDArray:
