@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from tracker.closest_points import ClosestPointsConfig
 from tracker.cloud import CloudConfig
+from tracker.contacts import ContactConfig
 from tracker.errors import ConfigError
 from tracker.matching import MatchingConfig
 from tracker.pose_filter import FilterConfig
@@ -58,6 +59,7 @@ class TrackerConfig(BaseModel):
     cloud: CloudConfig = CloudConfig()
     matching: MatchingConfig = MatchingConfig()
     registration: RegistrationConfig = RegistrationConfig()
+    contacts: ContactConfig = ContactConfig()
     verification: VerificationConfig = VerificationConfig()
     closest_points: ClosestPointsConfig = ClosestPointsConfig()
     refinement: RefinementConfig = RefinementConfig()

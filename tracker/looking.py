@@ -142,6 +142,8 @@ class Looking:
             best = self._likeliest(best, near, look)
         if look.start is None or (look.masked and (best is None or best.score < self._config.trust)):
             best = self._likeliest(best, self._search.anywhere(sight, cloud, clock), look)
+            if look.masked and (best is None or not self._good(best)):
+                best = self._likeliest(best, self._search.touching(sight, cloud, clock), look)
         if best is None:
             return "poor fit: no pose explains what is seen"
         best = self._likeliest(best, self._search.turned(best.hypothesis, sight, clock), look) or best
@@ -157,7 +159,10 @@ class Looking:
     def _clear(self, found: Found) -> bool:
         """Whether nothing better is to be expected: it fits well or is likely, and fits not much worse than it did."""
         as_usual = found.score >= self._usual - self._config.jump
-        return as_usual and (found.score >= self._config.trust or found.confidence >= self._config.sure)
+        return as_usual and self._good(found)
+
+    def _good(self, found: Found) -> bool:
+        return found.score >= self._config.trust or found.confidence >= self._config.sure
 
     def _sure(self, continued: Found) -> bool:
         """Whether concepts could say nothing new, as it is clearly where it was expected. Surface and colours alone let

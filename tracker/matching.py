@@ -104,6 +104,11 @@ class Matcher:
             found = found[np.sort(np.argsort(-found.margin, kind="stable")[: config.kept])]
         return found
 
+    def likeness(self, saliency: Float32s) -> torch.Tensor:
+        """(K, M) how alike each of K points' concepts (K, L) and each of the model's M points' are: the greater the
+        less they diverge. Rows are not comparable with each other."""
+        return encode_query(self._vectors(saliency), self._config.measure).features @ self._model
+
     def _vectors(self, saliency: Float32s) -> torch.Tensor:
         maps = torch.from_numpy(saliency).to(self._device)
         return concept_vectors(binary_maps(maps) if self._config.binary else maps, self._config.temperature)

@@ -97,9 +97,9 @@ def register_pairs(
     if len(motions) == 0:
         return []
     best = torch.arange(min(STARTS, len(motions)), device=generator.device)  # near-equals may end at different optima
-    motions = motions[torch.cat((best, _distinct(motions, diameter_m, 2 * config.candidates, config))).unique()]
+    motions = motions[torch.cat((best, distinct(motions, diameter_m, 2 * config.candidates, config))).unique()]
     motions, inliers, supports = _refit(centred, motions, config)
-    chosen = _distinct(motions, diameter_m, config.candidates, config)
+    chosen = distinct(motions, diameter_m, config.candidates, config)
     rotation = motions.rotation[chosen].double()
     translation = motions.translation[chosen].double() + centre - rotation @ model_centre
     return [
@@ -146,7 +146,7 @@ def _needed(best: float, points: int, config: RegistrationConfig) -> float:
     return log(1 - config.confidence) / log(1 - share) if config.confidence < 1 and share > 1e-12 else float("inf")
 
 
-def _distinct(motions: Motions, diameter_m: float, most: int, config: RegistrationConfig) -> torch.Tensor:
+def distinct(motions: Motions, diameter_m: float, most: int, config: RegistrationConfig) -> torch.Tensor:
     """Indices of up to `most` motions, in order, no two alike in angle and in where they put the model's centre."""
     turns, places_m = motions.rotation.flatten(1).cpu().numpy(), motions.translation.cpu().numpy()
     near_m, alike = config.distinct_share * diameter_m, 1 + 2 * cos(config.distinct_rad)

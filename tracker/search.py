@@ -13,11 +13,13 @@ from tracker.closest_points import ClosestPoints
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
+from tracker.contacts import Contacts
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
+from tracker.glance import Glance
 from tracker.matching import Correspondences, Matcher
 from tracker.refinement import Refined, Refiner
-from tracker.registration import Candidate, register
+from tracker.registration import register
 from tracker.rest import Resting
 from tracker.revolution import TURNS, Turns
 from tracker.silhouette import Silhouette
@@ -44,9 +46,9 @@ class Sight:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction, search, turn, of
-    another pose about its axis, or stillness, where it is if it stands still. view: the pixels by which it was
-    judged."""
+    """A refined pose, the evidence for it, and where the search for it began: concepts, prediction, search, contact, of
+    two points, turn, of another pose about its axis, or stillness, where it is if it stands still. view: the pixels by
+    which it was judged."""
 
     refined: Refined
     evidence: Evidence
@@ -66,6 +68,8 @@ class Search:
         self._verify = Verifier(model, config.verification, config.view.pixels_across)
         self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
         self._turns = Turns(model)
+        glance = Glance(model, config.verification, config.view.pixels_across, self._device)
+        self._touching = Contacts(model, config.contacts, config.registration, self._match, glance)
         self._matched: tuple[PointCloud, Correspondences] | None = None
 
     def outline(self, T_cam_obj: Pose, frame: Frame) -> Mask | str:
@@ -111,14 +115,28 @@ class Search:
         with clock("registration"):
             generator = torch.Generator(self._device).manual_seed(self._config.seed)
             candidates = register(correspondences, cloud, self._model, self._config.registration, generator)
-            candidates = self._inequivalent(candidates)
+            poses = self._inequivalent([candidate.T_cam_obj for candidate in candidates])
         with clock("verification"):
-            candidates.sort(key=lambda candidate: -self._roughly(candidate.T_cam_obj, sight))
+            poses.sort(key=lambda pose: -self._roughly(pose, sight))
+        return self._best_of(poses, sight, cloud, "search", clock)
+
+    def touching(self, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> list[Hypothesis]:
+        """The poses in which one point touches another that is like it, wherever they are, that explain most of what is
+        seen: they are had where next to no correspondence is right, and take longer."""
+        with clock("contacts"):
+            poses = self._touching(cloud, sight.view, sight.appearance, masked=sight.masked)
+            poses = self._inequivalent(poses)
+        return self._best_of(poses, sight, cloud, "contact", clock)
+
+    def _best_of(
+        self, poses: Sequence[Pose], sight: Sight, cloud: PointCloud, origin: str, clock: Stopwatch
+    ) -> list[Hypothesis]:
+        """What the first of them lead to."""
         found = []
-        for candidate in candidates[: self._config.verified]:
+        for pose in poses[: self._config.verified]:
             with clock("closest points"):
-                closer = self._closest.align(candidate.T_cam_obj, cloud)
-            found.append(self._refined(closer, sight, "search", clock))
+                closer = self._closest.align(pose, cloud)
+            found.append(self._refined(closer, sight, origin, clock))
         return [hypothesis for hypothesis in found if hypothesis]
 
     def turned(self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> list[Hypothesis]:
@@ -133,11 +151,11 @@ class Search:
         found = [self._refined(pose, sight, "turn", clock) for pose in chosen]
         return [hypothesis for hypothesis in found if hypothesis]
 
-    def _inequivalent(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Those that the object's symmetry does not make the same as a better supported one."""
+    def _inequivalent(self, poses: Sequence[Pose]) -> list[Pose]:
+        """Those that the object's symmetry does not make the same as one before them."""
         alike = self._config.registration
-        poses, distance_m = [c.T_cam_obj for c in candidates], alike.distinct_share * self._model.diameter_m
-        return [candidates[k] for k in self._model.symmetry.distinct(poses, alike.distinct_rad, distance_m)]
+        distance_m = alike.distinct_share * self._model.diameter_m
+        return [poses[k] for k in self._model.symmetry.distinct(poses, alike.distinct_rad, distance_m)]
 
     def _refined(self, T_start: Pose | None, sight: Sight, origin: str, clock: Stopwatch) -> Hypothesis | None:
         if T_start is None:

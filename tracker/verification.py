@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
-from tracker.geometry import Pose
+from tracker.geometry import Floats, Pose
 from tracker.lighting import colours_apart
 from tracker.projection import CELL_PX as SELF_HIDDEN_PX
 from tracker.projection import nearest_pixels, not_self_hidden, project
@@ -30,6 +31,10 @@ class VerificationConfig(BaseModel):
     depth_sigma_least_m: float = Field(default=0.003, gt=0)
     lab_sigma: float = Field(default=12.0, gt=0)
     colour_share: float = Field(default=0.7, ge=0, le=1)
+
+    def sigma_m(self, diameter_m: float) -> float:
+        """Distance at which a surface still agrees."""
+        return max(self.depth_sigma * diameter_m, self.depth_sigma_least_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +73,8 @@ UNKNOWN, LEAST_EXPLAINED = 0.5, 0.3
 CONTRADICTS = float(np.exp(-2))  # agreement at two lab_sigma: a colour that agrees less is another
 CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
 
+Shares = TypeVar("Shares", float, Floats)
+
 
 class Verifier:
     """Judges poses of one model. Each point counts by the cosine of its incidence: grazing surfaces prove little."""
@@ -77,8 +84,8 @@ class Verifier:
         chosen = evenly(model.points, config.model_points)
         self._points, self._normals = model.points[chosen], model.normals[chosen]
         self._lab = model_appearance(model, pixels_across).fine[chosen]
-        self._most = _most_shown(self._normals)
-        self._sigma_m = max(config.depth_sigma * model.diameter_m, config.depth_sigma_least_m)
+        self._most = most_shown(self._normals)
+        self._sigma_m = config.sigma_m(model.diameter_m)
 
     def __call__(
         self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance, *, around: bool = False
@@ -123,11 +130,11 @@ class Verifier:
         )
 
 
-def worth(explained: float) -> float:
+def worth(explained: Shares) -> Shares:
     """In [0, 1]. What a model does not know counts half of what it gets wrong, so that the true pose of an object that
     shows an unknown side is not beaten by a wrong one that shows a known side; under a third explained, worth falls
     with the square."""
-    return explained / (explained + UNKNOWN * (1 - explained)) * min(1.0, explained / LEAST_EXPLAINED) ** 2
+    return explained / (explained + UNKNOWN * (1 - explained)) * np.minimum(1.0, explained / LEAST_EXPLAINED) ** 2
 
 
 def _explained(rows: np.ndarray, columns: np.ndarray, view: ObjectView, cell_px: int) -> float:
@@ -163,7 +170,7 @@ def evenly(points: np.ndarray, most: int) -> np.ndarray:
     return chosen
 
 
-def _most_shown(normals: np.ndarray) -> float:
+def most_shown(normals: np.ndarray) -> float:
     """The largest weight of points (N, 3) that face a camera from any direction."""
     directions = np.random.default_rng(0).normal(size=(200, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
