@@ -21,7 +21,6 @@ MOST_CONTRADICTED, MOST_OUTSIDE, MOST_SEEN_THROUGH_AGAIN, MOST_GOES_ON = 0.15, 0
 # less in colour, and two were contradicted more; of 7 wrong ones 6 were out by one of the two.
 AS_COLOURED, MORE_CONTRADICTED = 0.75, 0.09
 AS_EXPLAINED = 0.6  # of what is found out of nowhere: in the place where it was, more of it may be hidden than usual
-ANYWHERE = ("search", "contact")  # origins of what was not looked for near the prediction
 MOST_DOUBTFUL = 3  # frames in a row in which what is followed may go beyond them
 
 
@@ -75,7 +74,7 @@ def _lacking(found: Found, followed: bool, config: TrackerConfig) -> str:
     """What a pose lacks. It has to be likely. Where nobody says which pixels are the object's, less is asked where it
     was expected while it is followed than of what is seen again near there or has jumped, so that a state does not
     flicker; and most where nothing was expected."""
-    seen, continued = found.hypothesis.evidence, found.masked or (followed and found.hypothesis.origin not in ANYWHERE)
+    seen, continued = found.hypothesis.evidence, found.masked or (followed and not found.jumped)
     out_of_nowhere = not continued and not found.expected
     if seen.surface < LEAST_SURFACE:
         return f"{seen.surface:.0%} of what should be seen is in place"

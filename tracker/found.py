@@ -29,14 +29,16 @@ class Look:
     """Where to look: the pixels of `mask` (H, W), near the pose `start`, or for any pose where there is none. expected:
     all poses that the object was expected at. place_m: (3,) camera coordinates, where somebody said that it is, though
     no pose could be told there. masked: the pixels are known to be the object's; then it is looked for in any pose too,
-    where it is not clearly near the start. contested: the next look is to be compared with it, however clear it is.
-    rest: tells where it is if it stands still, None where that is not known; it is to be asked in this frame."""
+    where it is not clearly near the start. told: somebody said that it is there, so that it is worth a longer search.
+    contested: the next look is to be compared with it, however clear it is. rest: tells where it is if it stands still,
+    None where that is not known; it is to be asked in this frame."""
 
     mask: Mask
     start: Pose | None
     expected: Sequence[Pose] = ()
     place_m: Floats | None = None
     masked: bool = False
+    told: bool = False
     contested: bool = False
     rest: Callable[[Refined | None, Symmetry], Resting | None] | None = None
 
@@ -44,7 +46,7 @@ class Look:
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """A pose, and what speaks for it. expected: it was about there, or somebody said that it is. masked: by pixels that
-    are known to be the object's. missed: why it did not even show at the first place where it was looked for; empty
+    are known to be the object's. jumped: it was looked for in any pose, and is not in one that was expected. missed: why it did not even show at the first place where it was looked for; empty
     where something did. saliency: what concepts said there, None where surface and colours were enough. usual: how it
     looked while it was followed, None where it was not."""
 
@@ -53,6 +55,7 @@ class Found:
     confidence: float
     expected: bool
     masked: bool
+    jumped: bool = False
     missed: str = ""
     saliency: Saliency | None = None
     usual: Usual | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -27,6 +28,7 @@ REMEMBERED = 30  # frames in which it was followed: a second of a usual camera
 STEADY_RAD = 0.15  # a pose farther than this from the expected one is a surprise
 CLEARLY_MORE = 0.05  # has a rival to explain: the evidence of one pose differs less by what moves it a bit
 TURNED_RAD = 0.175  # a pose farther than this from a right one is wrong
+ANYWHERE = ("search", "contact")  # origins of what was not looked for near the prediction
 
 T = TypeVar("T")
 # Asks for the saliency of a view, as often as it takes; is given None where that is not to be had now.
@@ -142,7 +144,7 @@ class Looking:
             best = self._likeliest(best, near, look)
         if look.start is None or (look.masked and (best is None or best.score < self._config.trust)):
             best = self._likeliest(best, self._search.anywhere(sight, cloud, clock), look)
-            if look.masked and (best is None or not self._good(best)):
+            if look.told and (best is None or not self._good(best)):
                 best = self._likeliest(best, self._search.touching(sight, cloud, clock), look)
         if best is None:
             return "poor fit: no pose explains what is seen"
@@ -177,9 +179,17 @@ class Looking:
         # What is not believed for its surface is no rival of a pose that may be.
         likely = confidence(grounds) if hypothesis.evidence.surface >= LEAST_SURFACE else 0.0
         usual = Usual(*np.median(self._looked, axis=0).tolist()) if self._looked else None
-        found = Found(hypothesis, grounds, likely, self._expects(look, hypothesis), look.masked, usual=usual)
+        found = Found(
+            hypothesis, grounds, likely, self._expects(look, hypothesis), look.masked,
+            jumped=self._jumped(hypothesis, look.expected), usual=usual,
+        )  # fmt: skip
         self.tried.append(found)
         return found
+
+    def _jumped(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> bool:
+        pose, symmetry = hypothesis.refined.T_cam_obj, self._model.symmetry
+        near = partial(symmetry.same, pose, angle_rad=TURNED_RAD, distance_m=self._model.diameter_m / 4)
+        return hypothesis.origin in ANYWHERE and not any(near(other) for other in expected)
 
     def _expects(self, look: Look, hypothesis: Hypothesis) -> bool:
         """Whether it is no farther than its own size from a place where it was expected, or is said to be."""

@@ -76,13 +76,13 @@ class Places:
         if mask is not None:
             yield from self._within(mask, predicted, now)
         elif self._there is not None:
-            yield Look(self._there, None)
+            yield Look(self._there, None, told=True)
         elif self._config.masks != "carried":
             yield f"no mask of object {self._model.object_id!r} was given"
         elif self._where.known:
             yield from self._near(predicted if followed else None, now, look)
         elif (place_m := self._where.pointed_out_m(now.camera)) is not None:
-            yield Look(now.unclaimed(self._proposals.around(place_m, now.frame)), None, place_m=place_m)
+            yield Look(now.unclaimed(self._proposals.around(place_m, now.frame)), None, place_m=place_m, told=True)
         else:
             yield "not seen yet"
 
@@ -130,10 +130,11 @@ class Places:
         starts = [pose for pose in (predicted, self._where.suspect(now.camera)) if pose is not None]
         rest = self._resting(now)
         if not starts:
-            yield Look(mask, None, masked=True, rest=rest)
+            yield Look(mask, None, masked=True, told=True, rest=rest)
         for k, start in enumerate(starts):
             contested = k < len(starts) - 1
-            yield Look(mask, start, tuple(starts[: k + 1]), masked=True, contested=contested, rest=rest)
+            near = tuple(starts[: k + 1])
+            yield Look(mask, start, near, masked=True, told=True, contested=contested, rest=rest)
 
     def _near(self, moving: Pose | None, now: Moment, look: Looking) -> Iterator[Look | str]:
         """Near each pose that is expected, of which there is one at least; where it is clearly at none, anywhere around
