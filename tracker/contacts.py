@@ -24,7 +24,7 @@ from tracker.umeyama import Motions
 from tracker.verification import evenly
 from tracker.view import ObjectView
 
-FEW_POINTS = 48  # by which all poses are looked at first
+FEW_POINTS, MORE_POINTS = 48, 128  # by which all poses are looked at first, and those that are looked at twice
 
 
 class ContactConfig(BaseModel):
@@ -59,7 +59,7 @@ class Contacts:
         motions = self._touching(cloud)
         rough = self._glance(motions, view, appearance, masked=masked, points=FEW_POINTS)
         motions = motions[rough.topk(min(self._config.kept, len(motions))).indices]
-        scores = self._glance(motions, view, appearance, masked=masked)
+        scores = self._glance(motions, view, appearance, masked=masked, points=MORE_POINTS)
         motions = motions[scores.argsort(descending=True, stable=True)]
         motions = motions[distinct(motions, self._diameter_m, self._alike.candidates, self._alike)]
         rotations, places_m = (part.double().cpu().numpy() for part in (motions.rotation, motions.translation))

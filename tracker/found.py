@@ -46,9 +46,10 @@ class Look:
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """A pose, and what speaks for it. expected: it was about there, or somebody said that it is. masked: by pixels that
-    are known to be the object's. jumped: it was looked for in any pose, and is not in one that was expected. missed: why it did not even show at the first place where it was looked for; empty
-    where something did. saliency: what concepts said there, None where surface and colours were enough. usual: how it
-    looked while it was followed, None where it was not."""
+    are known to be the object's. jumped: it was looked for in any pose, and is not in one that was expected. missed:
+    why it did not even show at the first place where it was looked for; empty where something did. saliency: what
+    concepts said there, None where surface and colours were enough. usual: how it looked while it was followed, None
+    where it was not."""
 
     hypothesis: Hypothesis
     grounds: Grounds

@@ -6,17 +6,19 @@ and what is explained is told from areas.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 
 from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
-from tracker.geometry import Intrinsics
+from tracker.geometry import Intrinsics, Pose
 from tracker.umeyama import Motions
 from tracker.verification import VerificationConfig, evenly, most_shown, worth
 from tracker.view import ObjectView
 
-POINTS = 128  # at most
+POINTS = 256  # at most
 BLOCK = 500_000  # points that are looked at at a time
 FACING_LEAST = 0.2
 LIGHTNESS_SHARE = 0.6  # of a difference in Lab: light changes it more than hue
@@ -39,6 +41,14 @@ class Glance:
             self._tensor(array) for array in (model.points[chosen] - self.centre_m, model.normals[chosen], lab)
         )
         self._plain_normals = model.normals[chosen]
+
+    def motions(self, poses: Sequence[Pose]) -> Motions:
+        """The same as poses T_cam_obj."""
+        rotation = self._tensor(np.array([pose.rotation for pose in poses]).reshape(-1, 3, 3))
+        translation = self._tensor(np.array([(pose @ self.centre_m[None])[0] for pose in poses]).reshape(-1, 3))
+        return Motions(
+            rotation, translation, torch.ones_like(translation[:, 0]), translation[:, 0] == translation[:, 0]
+        )
 
     def __call__(
         self, motions: Motions, view: ObjectView, appearance: ViewAppearance, *, masked: bool, points: int = POINTS

@@ -15,7 +15,7 @@ from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.contacts import Contacts
 from tracker.frame import Frame, Mask
-from tracker.geometry import Pose
+from tracker.geometry import Floats, Pose
 from tracker.glance import Glance
 from tracker.matching import Correspondences, Matcher
 from tracker.refinement import Refined, Refiner
@@ -68,8 +68,8 @@ class Search:
         self._verify = Verifier(model, config.verification, config.view.pixels_across)
         self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
         self._turns = Turns(model)
-        glance = Glance(model, config.verification, config.view.pixels_across, self._device)
-        self._touching = Contacts(model, config.contacts, config.registration, self._match, glance)
+        self._glance = Glance(model, config.verification, config.view.pixels_across, self._device)
+        self._touching = Contacts(model, config.contacts, config.registration, self._match, self._glance)
         self._matched: tuple[PointCloud, Correspondences] | None = None
 
     def outline(self, T_cam_obj: Pose, frame: Frame) -> Mask | str:
@@ -117,8 +117,8 @@ class Search:
             candidates = register(correspondences, cloud, self._model, self._config.registration, generator)
             poses = self._inequivalent([candidate.T_cam_obj for candidate in candidates])
         with clock("verification"):
-            poses.sort(key=lambda pose: -self._roughly(pose, sight))
-        return self._best_of(poses, sight, cloud, "search", clock)
+            best_first = np.argsort(-self._roughly(poses, sight), kind="stable")
+        return self._best_of([poses[k] for k in best_first], sight, cloud, "search", clock)
 
     def touching(self, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> list[Hypothesis]:
         """The poses in which one point touches another that is like it, wherever they are, that explain most of what is
@@ -141,12 +141,13 @@ class Search:
 
     def turned(self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> list[Hypothesis]:
         """The poses that its shape hardly tells from this one, those that explain most of what is seen."""
+        turns = self._turns.of(hypothesis.refined.T_cam_obj)
         with clock("verification"):
-            worth = {pose: self._roughly(pose, sight) for pose in self._turns.of(hypothesis.refined.T_cam_obj)}
-        likely = [pose for pose in worth if worth[pose] > HALF_AS_GOOD * hypothesis.evidence.score]
+            own, *worth = self._roughly([hypothesis.refined.T_cam_obj, *turns], sight)
         chosen: list[Pose] = []
-        for pose in sorted(likely, key=lambda pose: -worth[pose]):
-            if len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
+        for k in np.argsort(worth)[::-1]:
+            likely, pose = worth[k] > HALF_AS_GOOD * own, turns[k]
+            if likely and len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
                 chosen.append(pose)
         found = [self._refined(pose, sight, "turn", clock) for pose in chosen]
         return [hypothesis for hypothesis in found if hypothesis]
@@ -167,9 +168,10 @@ class Search:
         with clock("verification"):
             return self._judged(refined, sight, origin)
 
-    def _roughly(self, T_cam_obj: Pose, sight: Sight) -> float:
-        evidence = self._verify(T_cam_obj, sight.view, sight.appearance)
-        return evidence.score if sight.masked else evidence.of_itself
+    def _roughly(self, poses: Sequence[Pose], sight: Sight) -> Floats:
+        """(B,) how well each explains what is seen."""
+        motions = self._glance.motions(poses)
+        return self._glance(motions, sight.view, sight.appearance, masked=sight.masked).cpu().numpy()
 
     def _judged(self, refined: Refined, sight: Sight, origin: str) -> Hypothesis | None:
         """By the object's pixels. Where nobody knows them, by those that the pose itself says are the object's, and
