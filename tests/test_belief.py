@@ -78,7 +78,8 @@ def test_what_is_asked_of_a_pose_depends_on_how_it_came_about(
     refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
     grounds = Grounds(evidence, 0.01, None if how == "anywhere" else 0.02)
     expected, masked = how != "anywhere", how == "masked"
-    found = Found(Hypothesis(refined, evidence, origin, can_view), grounds, confidence, expected, masked)
+    hypothesis = Hypothesis(refined, evidence, origin, can_view)
+    found = Found(hypothesis, grounds, confidence, expected, masked, jumped=how == "jumped")
     followed, config = how in ("followed", "turned", "jumped"), TrackerConfig()
     assert believed(found, followed, config) == (not said)
     assert said in doubt(found, followed, config)
@@ -121,7 +122,8 @@ def test_what_is_seen_again_has_to_look_as_it_usually_did(
     origin = "prediction" if how == "followed" else "search"
     refined = Refined(Pose.identity(), np.eye(6), np.zeros((0, 6)), 0.0, 100)
     hypothesis = Hypothesis(refined, GOOD, origin, can_view)
-    found = Found(hypothesis, Grounds(GOOD, 0.01), 0.9, how not in ("anywhere", "jumped"), how == "masked", usual=usual)
+    expected, masked = how not in ("anywhere", "jumped"), how == "masked"
+    found = Found(hypothesis, Grounds(GOOD, 0.01), 0.9, expected, masked, jumped=how == "jumped", usual=usual)
     answer = doubt(found, how in ("followed", "jumped"), TrackerConfig())
     assert bool(answer) == (how in asked_of)
     assert not answer or said in answer

@@ -240,6 +240,38 @@ def test_what_explains_clearly_more_and_is_turned_otherwise_is_a_rival(
     assert looking.rival(other) is None
 
 
+def test_what_a_search_finds_where_it_was_expected_has_not_jumped(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+) -> None:
+    mask = can_frames[0].masks[CAN]
+    for turn_rad, shift_m, jumped in ((0.05, 0.005, False), (0.5, 0.0, True), (0.0, 0.06, True)):
+        expected = can_truth.nudged(np.array((turn_rad, 0, 0, shift_m, 0, 0)))
+        found = can_looking([Look(mask, None, (expected,), masked=True)], can_frames[0])
+        assert isinstance(found, Found)
+        assert found.hypothesis.origin == "search"
+        assert found.jumped == jumped
+
+
+def test_where_somebody_says_that_it_is_it_is_looked_for_longer(
+    can_looking: Counted, sliver: Frame, can_truth: Pose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Search, "anywhere", lambda *_: [])
+    look = Look(sliver.masks[CAN], None, masked=True, told=True)
+    found = can_looking([look], sliver)
+    assert isinstance(found, Found)
+    assert found.hypothesis.origin == "contact"
+    assert found.hypothesis.refined.T_cam_obj.distance_to_m(can_truth) < 0.01
+    assert isinstance(can_looking([replace(look, told=False)], sliver), str)
+
+
+def test_what_fits_well_is_not_looked_for_longer(
+    can_looking: Counted, can_frames: list[Frame], can_truth: Pose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(Search, "touching")
+    look = Look(can_frames[0].masks[CAN], None, masked=True, told=True)
+    assert_at(can_looking([look], can_frames[0]), can_truth)
+
+
 def at_rest(can_truth: Pose, sigma_rad: float = 0.02) -> Resting:
     return Resting(can_truth, np.diag([sigma_rad**2] * 3 + [0.002**2] * 3))
 

@@ -15,11 +15,12 @@ from tracker.config import TrackerConfig
 from tracker.declared_symmetry import parse_symmetry
 from tracker.frame import Frame
 from tracker.geometry import Pose
+from tracker.glance import Glance
 from tracker.registration import Candidate, register
 from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
 from tracker.symmetry import about
-from tracker.verification import Evidence, Verifier
+from tracker.umeyama import Motions
 from tracker.view import ObjectView, ViewConfig, view_object
 
 
@@ -48,6 +49,17 @@ def test_it_is_found_anywhere(can_search: Search, can_sight: Sight, can_cloud: P
     clock = Stopwatch()
     assert_found(best(can_search.anywhere(can_sight, can_cloud, clock)), can_truth, "search")
     assert "registration" in clock.timings_ms()
+
+
+def test_it_is_found_by_what_touches_what(
+    can_search: Search, can_sight: Sight, can_cloud: PointCloud, can_truth: Pose
+) -> None:
+    clock = Stopwatch()
+    found = can_search.touching(can_sight, can_cloud, clock)
+    assert_found(best(found), can_truth, "contact")
+    assert len(found) <= TrackerConfig().verified
+    assert "contacts" in clock.timings_ms()
+    assert "registration" not in clock.timings_ms()
 
 
 def test_near_the_prediction_nothing_is_sampled(
@@ -102,25 +114,25 @@ def test_where_nobody_knows_the_pixels_a_pose_is_judged_by_those_that_it_claims(
     assert unmasked.evidence.score > masked.evidence.score + 0.1
 
 
-def test_candidates_that_a_symmetry_makes_one_are_verified_once(
+def test_candidates_that_a_symmetry_makes_one_are_looked_at_once(
     can_model: ConceptModel, can_sight: Sight, can_cloud: PointCloud, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    verified: list[Pose] = []
+    glanced_at: list[Pose] = []
 
     def one_and_its_turns(*arguments: Any) -> list[Candidate]:
         best = register(*arguments)[0]
         return [replace(best, T_cam_obj=turned) for turned in parse_symmetry("z:60").equivalents(best.T_cam_obj)]
 
-    def verify(self: Verifier, pose: Pose, *seen: Any, **how: Any) -> Evidence:
-        verified.append(pose)
-        return usual(self, pose, *seen, **how)
+    def motions(self: Glance, poses: list[Pose]) -> Motions:
+        glanced_at.extend(poses)
+        return usual(self, poses)
 
-    usual = Verifier.__call__
+    usual = Glance.motions
     monkeypatch.setattr("tracker.search.register", one_and_its_turns)
-    monkeypatch.setattr(Verifier, "__call__", verify)
+    monkeypatch.setattr(Glance, "motions", motions)
     for symmetry, distinct in (("none", 6), ("z:120", 2), ("z:60", 1), ("z:inf", 1)):
-        verified.clear()
+        glanced_at.clear()
         config = TrackerConfig(prior=False, verified=1)
         search = Search(replace(can_model, symmetry=parse_symmetry(symmetry)), config)
         assert search.anywhere(can_sight, can_cloud, Stopwatch())
-        assert len(verified) == distinct + 1  # that one again, refined
+        assert len(glanced_at) == distinct

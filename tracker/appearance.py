@@ -18,17 +18,16 @@ SMOOTHING_PX = (0.8, 2.5)  # of a view; the model is smoothed alike over its sur
 SMOOTHING_NEIGHBOURS = 96  # at a point or two a pixel, all within two standard deviations of the coarse smoothing
 
 
-@dataclass(frozen=True, eq=False)
 class Smoothed:
-    """lab: (h, w, 3) CIE L*a*b* of a view. inside: (h, w) bool, the object's pixels."""
+    """lab: (h, w, 3) CIE L*a*b* of a view, smoothed within the object's pixels, inside: (h, w) bool."""
 
-    lab: Float32s
-    inside: Mask
+    def __init__(self, lab: Float32s, inside: Mask) -> None:
+        self.lab, self._inside = lab, inside
 
     @cached_property
     def gradient(self) -> Float32s:
         """(h, w, 6) Lab a pixel along columns, then rows; 0 across the border of the object."""
-        lab, inside = self.lab, self.inside
+        lab, inside = self.lab, self._inside
         gradient = np.zeros((*inside.shape, 6), np.float32)
         along_columns, along_rows = inside[:, 2:] & inside[:, :-2], inside[2:] & inside[:-2]
         gradient[:, 1:-1, :3] = (lab[:, 2:] - lab[:, :-2]) / 2 * along_columns[:, :, None]

@@ -20,7 +20,7 @@ from tracker.glance import Glance
 from tracker.matching import Matcher
 from tracker.registration import RegistrationConfig, distinct
 from tracker.threads import one_thread
-from tracker.umeyama import Motions
+from tracker.umeyama import Motions, rigid
 from tracker.verification import evenly
 from tracker.view import ObjectView
 
@@ -76,9 +76,7 @@ class Contacts:
         turned = seen_frames[:, None] @ _tensor(_turns(config.turns), device)  # (K, T, 3, 3)
         rotation = turned[:, None] @ frames[places].transpose(2, 3)[:, :, None]  # (K, P, T, 3, 3)
         translation = seen[:, None, None] - (rotation @ points[places][:, :, None, :, None]).squeeze(4)
-        rotation, translation = rotation.reshape(-1, 3, 3), translation.reshape(-1, 3)
-        one = torch.ones_like(translation[:, 0])
-        return Motions(rotation, translation, one, one > 0)
+        return rigid(rotation.reshape(-1, 3, 3), translation.reshape(-1, 3))
 
 
 def _frames(normals: Floats) -> Floats:

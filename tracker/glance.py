@@ -14,7 +14,7 @@ import torch
 from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
 from tracker.geometry import Intrinsics, Pose
-from tracker.umeyama import Motions
+from tracker.umeyama import Motions, rigid
 from tracker.verification import VerificationConfig, evenly, most_shown, worth
 from tracker.view import ObjectView
 
@@ -46,9 +46,7 @@ class Glance:
         """The same as poses T_cam_obj."""
         rotation = self._tensor(np.array([pose.rotation for pose in poses]).reshape(-1, 3, 3))
         translation = self._tensor(np.array([(pose @ self.centre_m[None])[0] for pose in poses]).reshape(-1, 3))
-        return Motions(
-            rotation, translation, torch.ones_like(translation[:, 0]), translation[:, 0] == translation[:, 0]
-        )
+        return rigid(rotation, translation)
 
     def __call__(
         self, motions: Motions, view: ObjectView, appearance: ViewAppearance, *, masked: bool, points: int = POINTS

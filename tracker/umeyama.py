@@ -35,6 +35,12 @@ class Motions:
         )
 
 
+def rigid(rotation: torch.Tensor, translation: torch.Tensor) -> Motions:
+    """B motions (B, 3, 3) and (B, 3) that change no distance."""
+    one = torch.ones_like(translation[:, 0])
+    return Motions(rotation, translation, one, one > 0)
+
+
 def no_motions(like: torch.Tensor) -> Motions:
     """None at all, of a tensor's type and device."""
     return Motions(like.new_zeros(0, 3, 3), like.new_zeros(0, 3), like.new_zeros(0), like.new_zeros(0) > 0)
