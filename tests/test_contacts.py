@@ -80,6 +80,11 @@ def test_poses_are_distinct_and_not_more_than_candidates_of_registration(
             assert turned or apart_m > ALIKE.distinct_share * can_model.diameter_m - 1e-5
 
 
+def test_it_can_be_left_out(can_model: ConceptModel, can_view: ObjectView, can_cloud: PointCloud) -> None:
+    left_out = contacts(can_model, ContactConfig(points=0))
+    assert left_out(can_cloud, can_view, ViewAppearance(can_view), masked=True) == []
+
+
 def test_the_same_is_found_the_same(can_model: ConceptModel, can_view: ObjectView, can_cloud: PointCloud) -> None:
     one, two = (contacts(can_model)(can_cloud, can_view, ViewAppearance(can_view), masked=True) for _ in range(2))
     assert all(np.array_equal(a.matrix, b.matrix) for a, b in zip(one, two, strict=True))

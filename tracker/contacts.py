@@ -28,13 +28,13 @@ FEW_POINTS, MORE_POINTS = 48, 128  # by which all poses are looked at first, and
 
 
 class ContactConfig(BaseModel):
-    """points: of the cloud, spread evenly, that are taken to touch the model. places: of the model, spread evenly, at
-    which they may; likely: of them, those that each point is most like. turns: about the normal, a round. kept: poses
-    that are looked at twice."""
+    """points: of the cloud, spread evenly, that are taken to touch the model, 0 for none. places: of the model, spread
+    evenly, at which they may; likely: of them, those that each point is most like. turns: about the normal, a round.
+    kept: poses that are looked at twice."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    points: int = Field(default=16, ge=1)
+    points: int = Field(default=16, ge=0)
     places: int = Field(default=200, ge=1)
     likely: int = Field(default=40, ge=1)
     turns: int = Field(default=18, ge=1)
@@ -56,6 +56,8 @@ class Contacts:
     @one_thread()
     def __call__(self, cloud: PointCloud, view: ObjectView, appearance: ViewAppearance, *, masked: bool) -> list[Pose]:
         """Distinct poses, those that explain most first; as many as registration may have candidates."""
+        if self._config.points == 0:
+            return []
         motions = self._touching(cloud)
         rough = self._glance(motions, view, appearance, masked=masked, points=FEW_POINTS)
         motions = motions[rough.topk(min(self._config.kept, len(motions))).indices]

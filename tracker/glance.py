@@ -40,7 +40,6 @@ class Glance:
         self._points, self._normals, self._lab = (
             self._tensor(array) for array in (model.points[chosen] - self.centre_m, model.normals[chosen], lab)
         )
-        self._plain_normals = model.normals[chosen]
 
     def motions(self, poses: Sequence[Pose]) -> Motions:
         """The same as poses T_cam_obj."""
@@ -63,7 +62,7 @@ class Glance:
         if masked:
             scores = agreed * worth(np.minimum(area_px / max(np.count_nonzero(view.has_depth), 1), 1))
         else:
-            scores = agreed * np.sqrt(np.minimum(shown / most_shown(self._plain_normals[:few]), 1))
+            scores = agreed * np.sqrt(np.minimum(shown / most_shown(self._normals[:few].cpu().numpy()), 1))
         return torch.from_numpy(scores).to(self._device)
 
     def _part(

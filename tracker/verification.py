@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
 
 from tracker.appearance import ViewAppearance, model_appearance
@@ -65,15 +65,13 @@ class Evidence:
     def of_itself(self) -> float:
         """In [0, 1], what speaks for a pose where nobody knows which pixels are the object's: how much of the model is
         in place and in colour, and how little of what should be is not."""
-        return self.score / max(worth(self.explained), 1e-9) * float(np.sqrt(self.proved))
+        return self.score / max(float(worth(self.explained)), 1e-9) * float(np.sqrt(self.proved))
 
 
 NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 UNKNOWN, LEAST_EXPLAINED = 0.5, 0.3
 CONTRADICTS = float(np.exp(-2))  # agreement at two lab_sigma: a colour that agrees less is another
 CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
-
-Shares = TypeVar("Shares", float, Floats)
 
 
 class Verifier:
@@ -117,7 +115,7 @@ class Verifier:
         met_px = rows[in_place], columns[in_place]
         explained = _explained(*met_px, view, round(CELL_PX * finer))
         return Evidence(
-            score=agreed * worth(explained),
+            score=agreed * float(worth(explained)),
             surface=float(surface.sum() / total),
             colour=float((surface * colour).sum() / met),
             contradicted=float((surface * (colour < CONTRADICTS)).sum() / met),
@@ -130,11 +128,12 @@ class Verifier:
         )
 
 
-def worth(explained: Shares) -> Shares:
-    """In [0, 1]. What a model does not know counts half of what it gets wrong, so that the true pose of an object that
-    shows an unknown side is not beaten by a wrong one that shows a known side; under a third explained, worth falls
-    with the square."""
-    return explained / (explained + UNKNOWN * (1 - explained)) * np.minimum(1.0, explained / LEAST_EXPLAINED) ** 2
+def worth(explained: npt.ArrayLike) -> Floats:
+    """In [0, 1], of one share or of many. What a model does not know counts half of what it gets wrong, so that the
+    true pose of an object that shows an unknown side is not beaten by a wrong one that shows a known side; under a
+    third explained, worth falls with the square."""
+    shares = np.asarray(explained, np.float64)
+    return shares / (shares + UNKNOWN * (1 - shares)) * np.minimum(1.0, shares / LEAST_EXPLAINED) ** 2
 
 
 def _explained(rows: np.ndarray, columns: np.ndarray, view: ObjectView, cell_px: int) -> float:
