@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tracker.belief import LEAST_ENDS, LEAST_SURFACE
+from tracker.belief import AS_EXPLAINED, LEAST_ENDS, LEAST_SURFACE
 from tracker.cloud import LEAST_POINTS, lift
 from tracker.concept import ConceptModel
 from tracker.confidence import Grounds, confidence, turn_sigma_rad
@@ -28,6 +28,7 @@ REMEMBERED = 30  # frames in which it was followed: a second of a usual camera
 STEADY_RAD = 0.15  # a pose farther than this from the expected one is a surprise
 CLEARLY_MORE = 0.05  # has a rival to explain: the evidence of one pose differs less by what moves it a bit
 TURNED_RAD = 0.175  # a pose farther than this from a right one is wrong
+ALIKE_RAD = 0.5  # an object that is lost is not expected to be turned by more meanwhile
 ANYWHERE = ("search", "contact")  # origins of what was not looked for near the prediction
 
 T = TypeVar("T")
@@ -68,8 +69,9 @@ class Looking:
         """What was believed, None where the object is lost: next time every place is looked at then."""
         self._usual = 1.0 if found is None else found.score
         if found is not None:
-            evidence = found.hypothesis.evidence
-            self._looked.append(Usual(found.explains, evidence.colour, evidence.contradicted))
+            evidence, usual = found.hypothesis.evidence, found.usual
+            if usual is None or found.explains > AS_EXPLAINED * usual.explains:  # else it hardly shows, or is another
+                self._looked.append(Usual(found.explains, evidence.colour, evidence.contradicted))
 
     def forget(self) -> None:
         """How it usually looked."""
@@ -192,10 +194,18 @@ class Looking:
         return hypothesis.origin in ANYWHERE and not any(near(other) for other in expected)
 
     def _expects(self, look: Look, hypothesis: Hypothesis) -> bool:
-        """Whether it is no farther than its own size from a place where it was expected, or is said to be."""
-        places_m = [pose @ self._centre_m[None] for pose in look.expected] if look.place_m is None else [look.place_m]
-        centre_m = hypothesis.refined.T_cam_obj @ self._centre_m[None]
-        return any(float(np.linalg.norm(centre_m - place_m)) < self._model.diameter_m for place_m in places_m)
+        """Whether it is no farther than its own size from where it was expected, and turned about alike; or from where
+        it is said to be."""
+        pose, diameter_m = hypothesis.refined.T_cam_obj, self._model.diameter_m
+        centre_m = pose @ self._centre_m[None]
+        if look.place_m is not None:
+            return float(np.linalg.norm(centre_m - look.place_m)) < diameter_m
+        nearest = (self._model.symmetry.nearest(other, pose) for other in look.expected)
+        return any(
+            float(np.linalg.norm(centre_m - other @ self._centre_m[None])) < diameter_m
+            and other.angle_to_rad(pose) < ALIKE_RAD
+            for other in nearest
+        )
 
     def _grounds(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> Grounds:
         refined, symmetry = hypothesis.refined, self._model.symmetry
