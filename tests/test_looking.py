@@ -116,6 +116,12 @@ def test_how_it_usually_looks_is_the_middle_of_the_last_frames_in_which_it_was_f
     can_looking.looking.came_of_it(hardly)
     can_looking.looking.came_of_it(hardly)
     assert again().usual == pytest.approx((hardly.explains, 0.2, GOOD.contradicted))
+    usual = again().usual
+    assert usual is not None
+    less = replace(hardly, usual=usual._replace(explains=2 * hardly.explains))
+    for _ in range(40):  # of what shows half as much as usual nothing is learnt
+        can_looking.looking.came_of_it(less)
+    assert again().usual == usual
     can_looking.looking.forget()
     assert again().usual is None
 
@@ -185,15 +191,17 @@ def test_what_is_found_about_where_somebody_pointed_was_expected_there(
     assert found.grounds.turn_rad is None  # a place has no pose that another could be turned from
 
 
-@pytest.mark.parametrize(("off_m", "expected"), [(0.02, True), (0.4, False)])
-def test_what_is_found_farther_than_its_own_size_from_where_it_was_expected_was_not_expected_there(
-    off_m: float, expected: bool, can_looking: Counted, can_frames: list[Frame], can_truth: Pose
+@pytest.mark.parametrize(
+    ("off_m", "turned_rad", "expected"), [(0.02, 0.0, True), (0.4, 0.0, False), (0.02, 0.4, True), (0.02, 0.8, False)]
+)
+def test_what_is_found_farther_than_its_own_size_away_or_turned_otherwise_was_not_expected_there(
+    off_m: float, turned_rad: float, expected: bool, can_looking: Counted, can_frames: list[Frame], can_truth: Pose
 ) -> None:
-    there = can_truth.nudged(np.array((0, 0, 0, off_m, 0, 0)))
+    there = can_truth.nudged(np.array((0, turned_rad, 0, off_m, 0, 0)))
     found = can_looking([Look(can_frames[0].masks[CAN], None, (there,))], can_frames[0])
     assert isinstance(found, Found)
     assert found.expected == expected
-    assert found.grounds.turn_rad == pytest.approx(0.0, abs=0.05)
+    assert found.grounds.turn_rad == pytest.approx(turned_rad, abs=0.05)
 
 
 GOOD = Evidence(
