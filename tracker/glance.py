@@ -14,6 +14,7 @@ import torch
 from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
 from tracker.geometry import Intrinsics, Pose
+from tracker.threads import one_thread
 from tracker.umeyama import Motions, rigid
 from tracker.verification import VerificationConfig, evenly, most_shown, worth
 from tracker.view import ObjectView
@@ -47,6 +48,7 @@ class Glance:
         translation = self._tensor(np.array([(pose @ self.centre_m[None])[0] for pose in poses]).reshape(-1, 3))
         return rigid(rotation, translation)
 
+    @one_thread()
     def __call__(
         self, motions: Motions, view: ObjectView, appearance: ViewAppearance, *, masked: bool, points: int = POINTS
     ) -> torch.Tensor:

@@ -166,6 +166,7 @@ class Looking:
         return as_usual and self._good(found)
 
     def _good(self, found: Found) -> bool:
+        """Whether it fits well or is likely, however it fitted before."""
         return found.score >= self._config.trust or found.confidence >= self._config.sure
 
     def _sure(self, continued: Found) -> bool:
