@@ -17,6 +17,7 @@ from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.glance import Glance
 from tracker.registration import Candidate, register
+from tracker.revolution import Turns
 from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
 from tracker.symmetry import about
@@ -82,6 +83,18 @@ def test_it_remembers_nothing(can_search: Search, can_sight: Sight, can_cloud: P
 
 
 @pytest.mark.parametrize("angle_deg", [-150, -60, 45, 100])
+def test_a_turn_that_leads_back_began_where_the_pose_did(
+    can_search: Search, can_sight: Sight, can_cloud: PointCloud, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = best(can_search.anywhere(can_sight, can_cloud, Stopwatch()))
+    for angle_rad, origin in ((0.05, "search"), (np.pi, "turn")):
+        turned = Pose(about(np.array((0.0, 0.0, 1.0)), angle_rad), np.zeros(3))
+        monkeypatch.setattr(Turns, "of", lambda _, pose, turned=turned: [pose @ turned])
+        monkeypatch.setattr("tracker.search.HALF_AS_GOOD", 0.0)
+        (again,) = can_search.turned(found, can_sight, Stopwatch())
+        assert again.origin == origin
+
+
 def test_a_turn_about_its_axis_that_the_shape_allows_is_undone_by_the_paint(
     angle_deg: float, can_search: Search, can_sight: Sight, can_truth: Pose
 ) -> None:

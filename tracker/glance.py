@@ -14,16 +14,14 @@ import torch
 from tracker.appearance import ViewAppearance, model_appearance
 from tracker.concept import ConceptModel
 from tracker.geometry import Intrinsics, Pose
+from tracker.lighting import LIGHTNESS_SHARE
 from tracker.threads import one_thread
 from tracker.umeyama import Motions, rigid
-from tracker.verification import VerificationConfig, evenly, most_shown, worth
+from tracker.verification import FACING_LEAST, REACH, VerificationConfig, evenly, most_shown, worth
 from tracker.view import ObjectView
 
 POINTS = 256  # at most
 BLOCK = 500_000  # points that are looked at at a time
-FACING_LEAST = 0.2
-LIGHTNESS_SHARE = 0.6  # of a difference in Lab: light changes it more than hue
-REACH = 2.5  # standard deviations of depth within which a surface is in place
 PACKED = 0.87  # points as far apart as they can be have about this times their distance squared each, as hexagons do
 
 

@@ -13,6 +13,7 @@ GAIN_SIGMA, OFFSET_SIGMA = 0.5, 25.0
 RATIO_SIGMA = 0.08  # how far the ratio of two brightnesses strays where the colours are the same
 RIDGE = 0.015  # what a slope of 1 costs, in points: what only a few points speak for stays small
 ROUNDS = 3
+LIGHTNESS_SHARE = 0.6  # of a difference in Lab: light changes it more than hue
 LEAST_POINTS = 20  # fewer say nothing of the light
 
 
@@ -31,7 +32,7 @@ def colours_apart(lab: Floats, model_lab: Floats, normals: Floats, known: Mask) 
     gains = np.clip(_shading(ratio, normals, known, gain), *GAIN_RANGE)
     expected = gains[:, None] * (model_lab - NO_LIGHT) + NO_LIGHT
     offset = np.median((lab - expected)[known], axis=0)
-    apart = np.linalg.norm((lab - expected - offset) * (0.6, 1, 1), axis=1)
+    apart = np.linalg.norm((lab - expected - offset) * (LIGHTNESS_SHARE, 1, 1), axis=1)
     drift = np.linalg.norm(offset * (0.3, 1, 1))
     return apart, float(np.exp(-0.5 * ((np.log(gain) / GAIN_SIGMA) ** 2 + (drift / OFFSET_SIGMA) ** 2)))
 

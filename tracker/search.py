@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -140,7 +140,8 @@ class Search:
         return [hypothesis for hypothesis in found if hypothesis]
 
     def turned(self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> list[Hypothesis]:
-        """The poses that its shape hardly tells from this one, those that explain most of what is seen."""
+        """The poses that its shape hardly tells from this one, those that explain most of what is seen. One that leads
+        back to it began where it did."""
         turns = self._turns.of(hypothesis.refined.T_cam_obj)
         with clock("verification"):
             own, *worth = self._roughly([hypothesis.refined.T_cam_obj, *turns], sight)
@@ -149,8 +150,12 @@ class Search:
             likely, pose = worth[k] > HALF_AS_GOOD * own, turns[k]
             if likely and len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
                 chosen.append(pose)
-        found = [self._refined(pose, sight, "turn", clock) for pose in chosen]
-        return [hypothesis for hypothesis in found if hypothesis]
+        found = [turned for pose in chosen if (turned := self._refined(pose, sight, "turn", clock))]
+        there = hypothesis.refined.T_cam_obj
+        back = [self._alike(turned.refined.T_cam_obj, there) for turned in found]
+        return [
+            replace(turn, origin=hypothesis.origin) if same else turn for turn, same in zip(found, back, strict=True)
+        ]
 
     def _inequivalent(self, poses: Sequence[Pose]) -> list[Pose]:
         """Those that the object's symmetry does not make the same as one before them."""

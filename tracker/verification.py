@@ -70,6 +70,8 @@ class Evidence:
 
 NOTHING_SEEN = Evidence(0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 UNKNOWN, LEAST_EXPLAINED = 0.5, 0.3
+FACING_LEAST = 0.2  # cosine of incidence: more grazing surfaces are not judged
+REACH = 2.5  # standard deviations of depth within which a surface is in place
 CONTRADICTS = float(np.exp(-2))  # agreement at two lab_sigma: a colour that agrees less is another
 CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
 
@@ -90,7 +92,7 @@ class Verifier:
     ) -> Evidence:
         """around: whether to look at what is around it, too."""
         at = project(self._points, self._normals, T_cam_obj, view.camera)
-        faces = (at.facing > 0.2) & (at.points_cam[:, 2] > 0)
+        faces = (at.facing > FACING_LEAST) & (at.points_cam[:, 2] > 0)
         if not faces.any():
             return NOTHING_SEEN
         finer = max(1.0, view.pixels_across / self._pixels_across)  # than usual, where little of the object shows
@@ -99,7 +101,7 @@ class Verifier:
         on_object = at.within(view.camera, 0) & view.inside[rows, columns]
         measured_m = np.where(on_object, view.depth_m[rows, columns], _frame_depth_m(at.points_cam, view))
         behind_m = np.where(measured_m > 0, measured_m - at.points_cam[:, 2], 0.0)
-        reach_m = 2.5 * self._sigma_m
+        reach_m = REACH * self._sigma_m
         hidden = faces & ~on_object & (behind_m < -reach_m)
         due = faces & ~hidden
         weights = at.facing * due
@@ -174,4 +176,4 @@ def most_shown(normals: np.ndarray) -> float:
     directions = np.random.default_rng(0).normal(size=(200, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     cosines = normals @ directions.T
-    return float(np.where(cosines > 0.2, cosines, 0).sum(axis=0).max())
+    return float(np.where(cosines > FACING_LEAST, cosines, 0).sum(axis=0).max())
