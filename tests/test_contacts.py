@@ -15,14 +15,15 @@ from tracker.geometry import Pose
 from tracker.glance import Glance
 from tracker.matching import Matcher, MatchingConfig
 from tracker.registration import RegistrationConfig
-from tracker.verification import VerificationConfig, evenly
+from tracker.verification import VerificationConfig, Verifier, evenly
 from tracker.view import ObjectView, ViewConfig
 
 CONFIG, ALIKE, CPU = ContactConfig(), RegistrationConfig(), torch.device("cpu")
 
 
 def contacts(model: ConceptModel, config: ContactConfig = CONFIG) -> Contacts:
-    glance = Glance(model, VerificationConfig(), ViewConfig().pixels_across, CPU)
+    judged = VerificationConfig()
+    glance = Glance(model, Verifier(model, judged, ViewConfig().pixels_across).surface, judged, CPU)
     return Contacts(model, config, ALIKE, Matcher(model, MatchingConfig(), CPU), glance)
 
 

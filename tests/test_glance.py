@@ -20,7 +20,7 @@ CONFIG, ACROSS, CPU = VerificationConfig(), ViewConfig().pixels_across, torch.de
 
 @pytest.fixture(scope="module")
 def glance(can_model: ConceptModel) -> Glance:
-    return Glance(can_model, CONFIG, ACROSS, CPU)
+    return Glance(can_model, Verifier(can_model, CONFIG, ACROSS).surface, CONFIG, CPU)
 
 
 def nudges(count: int, most_rad: float, most_m: float) -> list[np.ndarray]:

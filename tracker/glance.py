@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from tracker.appearance import ViewAppearance, model_appearance
+from tracker.appearance import ViewAppearance
 from tracker.concept import ConceptModel
 from tracker.geometry import Intrinsics, Pose
 from tracker.lighting import LIGHTNESS_SHARE
 from tracker.threads import one_thread
 from tracker.umeyama import Motions, rigid
-from tracker.verification import FACING_LEAST, REACH, VerificationConfig, evenly, most_shown, worth
+from tracker.verification import FACING_LEAST, REACH, JudgedSurface, VerificationConfig, most_shown, worth
 from tracker.view import ObjectView
 
 POINTS = 256  # at most
@@ -29,16 +29,13 @@ class Glance:
     """For one model. Motions are from its points less `centre_m` to camera coordinates."""
 
     def __init__(
-        self, model: ConceptModel, config: VerificationConfig, pixels_across: int, device: torch.device
+        self, model: ConceptModel, surface: JudgedSurface, config: VerificationConfig, device: torch.device
     ) -> None:
         self._config, self._device = config, device
         self._sigma_m = config.sigma_m(model.diameter_m)
         self.centre_m = model.points.mean(axis=0)
-        chosen = evenly(model.points, POINTS)
-        lab = model_appearance(model, pixels_across).fine[chosen]
-        self._points, self._normals, self._lab = (
-            self._tensor(array) for array in (model.points[chosen] - self.centre_m, model.normals[chosen], lab)
-        )
+        self._points = self._tensor(surface.points[:POINTS] - self.centre_m)
+        self._normals, self._lab = self._tensor(surface.normals[:POINTS]), self._tensor(surface.lab[:POINTS])
 
     def motions(self, poses: Sequence[Pose]) -> Motions:
         """The same as poses T_cam_obj."""

@@ -68,7 +68,7 @@ class Search:
         self._verify = Verifier(model, config.verification, config.view.pixels_across)
         self._silhouette = Silhouette(model, config.silhouette, config.view.pixels_across)
         self._turns = Turns(model)
-        self._glance = Glance(model, config.verification, config.view.pixels_across, self._device)
+        self._glance = Glance(model, self._verify.surface, config.verification, self._device)
         self._touching = Contacts(model, config.contacts, config.registration, self._match, self._glance)
         self._matched: tuple[PointCloud, Correspondences] | None = None
 

@@ -76,22 +76,33 @@ CONTRADICTS = float(np.exp(-2))  # agreement at two lab_sigma: a colour that agr
 CELL_PX = 3  # of a view of the usual resolution: the sampled points of a surface leave no cell of this size empty
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedSurface:
+    """(N, 3) each, of points of a model: places, normals, CIE L*a*b*. They are spread evenly, and so are the first ones
+    of them, however many."""
+
+    points: Floats
+    normals: Floats
+    lab: Floats
+
+
 class Verifier:
     """Judges poses of one model. Each point counts by the cosine of its incidence: grazing surfaces prove little."""
 
     def __init__(self, model: ConceptModel, config: VerificationConfig, pixels_across: int) -> None:
         self._config, self._diameter_m, self._pixels_across = config, model.diameter_m, pixels_across
         chosen = evenly(model.points, config.model_points)
-        self._points, self._normals = model.points[chosen], model.normals[chosen]
-        self._lab = model_appearance(model, pixels_across).fine[chosen]
-        self._most = most_shown(self._normals)
+        lab = model_appearance(model, pixels_across).fine
+        self.surface = JudgedSurface(model.points[chosen], model.normals[chosen], lab[chosen])
+        self._most = most_shown(self.surface.normals)
         self._sigma_m = config.sigma_m(model.diameter_m)
 
     def __call__(
         self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance, *, around: bool = False
     ) -> Evidence:
         """around: whether to look at what is around it, too."""
-        at = project(self._points, self._normals, T_cam_obj, view.camera)
+        judged = self.surface
+        at = project(judged.points, judged.normals, T_cam_obj, view.camera)
         faces = (at.facing > FACING_LEAST) & (at.points_cam[:, 2] > 0)
         if not faces.any():
             return NOTHING_SEEN
@@ -110,7 +121,9 @@ class Verifier:
             return NOTHING_SEEN
         in_place = due & on_object & (measured_m > 0) & (np.abs(behind_m) < reach_m)
         surface = weights * in_place * np.exp(-0.5 * (behind_m / self._sigma_m) ** 2)
-        apart, usual = colours_apart(appearance.fine.lab[rows, columns], self._lab, self._normals, in_place)
+        apart, usual = colours_apart(
+            appearance.fine.lab[rows, columns], self.surface.lab, self.surface.normals, in_place
+        )
         colour = usual * np.exp(-0.5 * (apart / self._config.lab_sigma) ** 2)
         met = max(float(surface.sum()), 1e-9)
         agreed = float((surface * colour**self._config.colour_share).sum() / total)
