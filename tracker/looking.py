@@ -26,10 +26,10 @@ from tracker.view import ObjectView, view_object
 MOST_TRIED = 64  # poses that are remembered
 REMEMBERED = 30  # frames in which it was followed: a second of a usual camera
 STEADY_RAD = 0.15  # a pose farther than this from the expected one is a surprise
+ASKED_LATELY = 3  # frames: what concepts could not explain they cannot in the next ones
 CLEARLY_MORE = 0.05  # has a rival to explain: the evidence of one pose differs less by what moves it a bit
 TURNED_RAD = 0.175  # a pose farther than this from a right one is wrong
 ALIKE_RAD = 0.5  # an object that is lost is not expected to be turned by more meanwhile
-ANYWHERE = ("search", "contact")  # origins of what was not looked for near the prediction
 
 T = TypeVar("T")
 # Asks for the saliency of a view, as often as it takes; is given None where that is not to be had now.
@@ -174,7 +174,7 @@ class Looking:
         a plain cup slide around its axis until the handle is out of sight; and what a pose leaves unexplained may be a
         side that the model does not know, or one that it knows at another pose."""
         steady = continued.grounds.turn_rad is not None and continued.grounds.turn_rad < STEADY_RAD
-        mostly = continued.hypothesis.evidence.explained >= LEAST_ENDS
+        mostly = continued.hypothesis.evidence.explained >= LEAST_ENDS or self._without_concepts < ASKED_LATELY
         return steady and mostly and self._clear(continued) and continued.confidence >= self._config.sure
 
     def _found(self, hypothesis: Hypothesis, look: Look) -> Found:
@@ -192,7 +192,7 @@ class Looking:
     def _jumped(self, hypothesis: Hypothesis, expected: Sequence[Pose]) -> bool:
         pose, symmetry = hypothesis.refined.T_cam_obj, self._model.symmetry
         near = partial(symmetry.same, pose, angle_rad=TURNED_RAD, distance_m=self._model.diameter_m / 4)
-        return hypothesis.origin in ANYWHERE and not any(near(other) for other in expected)
+        return hypothesis.anywhere and not any(near(other) for other in expected)
 
     def _expects(self, look: Look, hypothesis: Hypothesis) -> bool:
         """Whether it is no farther than its own size from where it was expected, and turned about alike; or from where

@@ -48,12 +48,13 @@ class Sight:
 class Hypothesis:
     """A refined pose, the evidence for it, and where the search for it began: concepts, prediction, search, contact, of
     two points, turn, of another pose about its axis, or stillness, where it is if it stands still. view: the pixels by
-    which it was judged."""
+    which it was judged. anywhere: it was looked for in any pose, not near an expected one, or is a turn of such."""
 
     refined: Refined
     evidence: Evidence
     origin: str
     view: ObjectView
+    anywhere: bool = False
 
 
 class Search:
@@ -137,11 +138,11 @@ class Search:
             with clock("closest points"):
                 closer = self._closest.align(pose, cloud)
             found.append(self._refined(closer, sight, origin, clock))
-        return [hypothesis for hypothesis in found if hypothesis]
+        return [replace(hypothesis, anywhere=True) for hypothesis in found if hypothesis]
 
     def turned(self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> list[Hypothesis]:
-        """The poses that its shape hardly tells from this one, those that explain most of what is seen. One that leads
-        back to it began where it did."""
+        """The poses that its shape hardly tells from this one, those that explain most of what is seen. They were looked
+        for where it was, and one that leads back to it began where it did."""
         turns = self._turns.of(hypothesis.refined.T_cam_obj)
         with clock("verification"):
             own, *worth = self._roughly([hypothesis.refined.T_cam_obj, *turns], sight)
@@ -153,8 +154,10 @@ class Search:
         found = [turned for pose in chosen if (turned := self._refined(pose, sight, "turn", clock))]
         there = hypothesis.refined.T_cam_obj
         back = [self._alike(turned.refined.T_cam_obj, there) for turned in found]
+        origins = [hypothesis.origin if same else turned.origin for turned, same in zip(found, back, strict=True)]
         return [
-            replace(turn, origin=hypothesis.origin) if same else turn for turn, same in zip(found, back, strict=True)
+            replace(turned, origin=origin, anywhere=hypothesis.anywhere)
+            for turned, origin in zip(found, origins, strict=True)
         ]
 
     def _inequivalent(self, poses: Sequence[Pose]) -> list[Pose]:
