@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tracker.closest_points import ClosestPoints
 from tracker.cloud import PointCloud
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
@@ -69,14 +70,35 @@ def test_near_the_prediction_nothing_is_sampled(
     clock = Stopwatch()
     near = can_truth.nudged(np.array((0.1, -0.05, 0.1, 0.005, -0.005, 0.01)))
     assert_found(
-        best(can_search.near(near, can_sight, can_cloud, clock, by_surface=True)), can_truth, "concepts", "prediction"
-    )
+        best(can_search.near(near, None, can_sight, can_cloud, clock, by_surface=True)),
+        can_truth, "concepts", "prediction",
+    )  # fmt: skip
     assert "registration" not in clock.timings_ms()
+
+
+def test_what_leads_to_where_it_was_continued_to_is_not_looked_at_again(
+    can_search: Search, can_sight: Sight, can_cloud: PointCloud, can_truth: Pose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    continued = can_search.continued(can_truth, can_sight, Stopwatch())
+    assert continued is not None
+    for turn_rad, looked_at in ((0.01, 0), (0.1, 1)):
+        aligned = continued.refined.T_cam_obj.nudged(np.array((0.0, turn_rad, 0.0, 0.0, 0.0, 0.0)))
+        monkeypatch.setattr(ClosestPoints, "align", lambda *_, aligned=aligned: aligned)
+        near = can_search.near(can_truth, continued, can_sight, can_cloud, Stopwatch(), by_surface=True)
+        assert len(near) == looked_at
+
+
+def test_what_leads_to_the_same_is_judged_once(
+    can_search: Search, can_sight: Sight, can_cloud: PointCloud, can_truth: Pose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert len(can_search.touching(can_sight, can_cloud, Stopwatch())) > 1
+    monkeypatch.setattr(ClosestPoints, "align", lambda *_: can_truth)
+    assert len(can_search.touching(can_sight, can_cloud, Stopwatch())) == 1
 
 
 def test_it_remembers_nothing(can_search: Search, can_sight: Sight, can_cloud: PointCloud, can_truth: Pose) -> None:
     first = can_search.anywhere(can_sight, can_cloud, Stopwatch())
-    can_search.near(can_truth, can_sight, can_cloud, Stopwatch(), by_surface=True)
+    can_search.near(can_truth, None, can_sight, can_cloud, Stopwatch(), by_surface=True)
     again = can_search.anywhere(can_sight, can_cloud, Stopwatch())
     for one, other in zip(first, again, strict=True):
         assert np.array_equal(one.refined.T_cam_obj.matrix, other.refined.T_cam_obj.matrix)
@@ -89,9 +111,10 @@ def test_a_turn_that_leads_back_began_where_the_pose_did(
     for angle_rad, origin in ((0.05, "search"), (np.pi, "turn")):
         turned = Pose(about(np.array((0.0, 0.0, 1.0)), angle_rad), np.zeros(3))
         monkeypatch.setattr(Turns, "of", lambda _, pose, turned=turned: [pose @ turned])
-        monkeypatch.setattr("tracker.search.HALF_AS_GOOD", 0.0)
+        monkeypatch.setattr("tracker.search.NEARLY_AS_GOOD", 0.0)
         (again,) = can_search.turned(found, can_sight, Stopwatch())
         assert again.origin == origin
+        assert again.anywhere  # as what it is a turn of
 
 
 @pytest.mark.parametrize("angle_deg", [-150, -60, 45, 100])

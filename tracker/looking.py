@@ -142,7 +142,7 @@ class Looking:
             return best or f"too little to see: {len(cloud)} usable points, {LEAST_POINTS} are needed"
         if look.start is not None:
             unclear = best is None or not self._clear(best)  # else the surface has said all that it can
-            near = self._search.near(look.start, sight, cloud, clock, by_surface=unclear)
+            near = self._search.near(look.start, continued, sight, cloud, clock, by_surface=unclear)
             best = self._likeliest(best, near, look)
         if look.start is None or (look.masked and (best is None or best.score < self._config.trust)):
             best = self._likeliest(best, self._search.anywhere(sight, cloud, clock), look)

@@ -27,7 +27,7 @@ from tracker.stopwatch import Stopwatch
 from tracker.verification import Evidence, Verifier
 from tracker.view import ObjectView, view_object
 
-HALF_AS_GOOD = 0.5  # before refinement a turned pose explains less than it will
+NEARLY_AS_GOOD = 0.75  # before refinement a turned pose explains less than it will
 TURNED, NEIGHBOUR_RAD = 2, 1.5 * 2 * np.pi / TURNS  # refined at most, none of them next to another
 
 
@@ -82,16 +82,27 @@ class Search:
         return self._refined(predicted, sight, "prediction", clock)
 
     def near(
-        self, predicted: Pose, sight: Sight, cloud: PointCloud, clock: Stopwatch, *, by_surface: bool
+        self,
+        predicted: Pose,
+        continued: Hypothesis | None,
+        sight: Sight,
+        cloud: PointCloud,
+        clock: Stopwatch,
+        *,
+        by_surface: bool,
     ) -> list[Hypothesis]:
-        """Poses near the prediction, two at most: pulled by the concepts first, and by_surface alone too."""
+        """Poses near the prediction, two at most, other than the one that it was continued to: pulled by the concepts
+        first, and by_surface alone too."""
         correspondences = self._correspondences(cloud, clock)
         with clock("closest points"):
             pulled = self._closest.align(self._closest.pull(predicted, correspondences, cloud), cloud)
             direct = self._closest.align(predicted, cloud) if by_surface else None
-        found = [self._refined(pulled, sight, "concepts", clock)]
-        if direct and not (pulled and self._alike(direct, pulled)):
-            found.append(self._refined(direct, sight, "prediction", clock))
+        reached = [] if continued is None else [continued.refined.T_cam_obj]
+        found = []
+        for pose, origin in ((pulled, "concepts"), (direct, "prediction")):
+            if pose and not any(self._alike(pose, other) for other in reached):
+                found.append(self._refined(pose, sight, origin, clock))
+                reached.append(pose)
         return [hypothesis for hypothesis in found if hypothesis]
 
     def held(self, refined: Refined | None, resting: Resting, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
@@ -132,23 +143,25 @@ class Search:
     def _best_of(
         self, poses: Sequence[Pose], sight: Sight, cloud: PointCloud, origin: str, clock: Stopwatch
     ) -> list[Hypothesis]:
-        """What the first of them lead to."""
-        found = []
+        """What the first of them lead to, once where several lead to the same."""
+        found, reached = [], []
         for pose in poses[: self._config.verified]:
             with clock("closest points"):
                 closer = self._closest.align(pose, cloud)
-            found.append(self._refined(closer, sight, origin, clock))
+            if closer and not any(self._alike(closer, other) for other in reached):
+                found.append(self._refined(closer, sight, origin, clock))
+                reached.append(closer)
         return [replace(hypothesis, anywhere=True) for hypothesis in found if hypothesis]
 
     def turned(self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> list[Hypothesis]:
-        """The poses that its shape hardly tells from this one, those that explain most of what is seen. They were looked
-        for where it was, and one that leads back to it began where it did."""
+        """The poses that its shape hardly tells from this one, those that explain most of what is seen. One that leads
+        back to it began where it did."""
         turns = self._turns.of(hypothesis.refined.T_cam_obj)
         with clock("verification"):
             own, *worth = self._roughly([hypothesis.refined.T_cam_obj, *turns], sight)
         chosen: list[Pose] = []
         for k in np.argsort(worth)[::-1]:
-            likely, pose = worth[k] > HALF_AS_GOOD * own, turns[k]
+            likely, pose = worth[k] > NEARLY_AS_GOOD * own, turns[k]
             if likely and len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
                 chosen.append(pose)
         found = [turned for pose in chosen if (turned := self._refined(pose, sight, "turn", clock))]
