@@ -10,6 +10,8 @@ import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
 from reference.cross_check import cross_check, others_than
+from reference.group_means import GroupMeans
+from reference.one_light import in_one_light
 from tracker.cloud import PointCloud
 from tracker.errors import OnboardingError
 from tracker.frame import PosedFrame
@@ -45,8 +47,8 @@ def fuse(clouds: Sequence[PointCloud], frames: Sequence[PosedFrame], diameter_m:
     """Join the views' clouds (camera coordinates), each with the frame that it is from, as means over voxels.
 
     Points that the other frames deny are left out. A point weighs by the cosine of its angle of incidence over its
-    squared distance, as its share of the picture does. The voxels stand in the first frame's camera, so that the model
-    does not depend on how the object's own axes were chosen.
+    squared distance, as its share of the picture does. Colours are made those of one light first. The voxels stand in
+    the first frame's camera, so that the model does not depend on how the object's own axes were chosen.
     """
     slack_m = DEPTH_SLACK * diameter_m
     parts = [_part(cloud, frames, k, slack_m) for k, cloud in enumerate(clouds)]
@@ -54,7 +56,8 @@ def fuse(clouds: Sequence[PointCloud], frames: Sequence[PosedFrame], diameter_m:
         np.concatenate([part[field] for part in parts]) for field in range(7)
     )
     voxel = _voxels(points, normals, voxel_m)
-    mean = _Mean(voxel, weights)
+    colours = in_one_light(colours, normals, voxel, views, weights)
+    mean = GroupMeans(voxel, weights)
     unit = mean(normals)
     fused = mean(saliency)
     T_obj_ref = frames[0].T_cam_obj.inverse()
@@ -97,23 +100,12 @@ def _voxels(points: Floats, normals: Floats, voxel_m: float) -> npt.NDArray[np.i
     return np.unique(np.concatenate((cells, sides), axis=1), axis=0, return_inverse=True)[1].reshape(-1)
 
 
-class _Mean:
-    """Weighted means over the points of every voxel: (N, C) -> (V, C)."""
-
-    def __init__(self, voxel: npt.NDArray[np.intp], weights: Floats) -> None:
-        self._voxel, self._weights, self._total = voxel, weights, np.bincount(voxel, weights)
-
-    def __call__(self, values: npt.NDArray) -> Floats:
-        sums = [np.bincount(self._voxel, self._weights * column) for column in values.T]
-        return np.stack(sums, axis=1) / self._total[:, None]
-
-
 def _agreement(
     voxel: npt.NDArray[np.intp], views: npt.NDArray[np.intp], weights: Floats, saliency: Float32s, fused: Floats
 ) -> Floats:
     """(V,) mean over a voxel's views of the cosine between the view's saliency and the fused one."""
     pairs, pair = np.unique(np.stack((voxel, views), axis=1), axis=0, return_inverse=True)
-    of_view, of_voxel = _Mean(pair.reshape(-1), weights)(saliency), fused[pairs[:, 0]]
+    of_view, of_voxel = GroupMeans(pair.reshape(-1), weights)(saliency), fused[pairs[:, 0]]
     norms = np.linalg.norm(of_view, axis=1) * np.linalg.norm(of_voxel, axis=1)
     cosine = (of_view * of_voxel).sum(axis=1) / np.maximum(norms, 1e-12)
     return (np.bincount(pairs[:, 0], cosine) / np.bincount(pairs[:, 0])).clip(0, 1)

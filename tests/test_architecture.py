@@ -38,8 +38,8 @@ ORDER = {
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "planes",
-        "segment", "fusion", "quality", "self_alignment", "symmetry_detection", "onboard", "growing", "completion",
-        "unposed", "live", "sheet", "plate", "view_plate", "__main__",
+        "segment", "group_means", "one_light", "fusion", "quality", "self_alignment", "symmetry_detection", "onboard",
+        "growing", "completion", "unposed", "live", "sheet", "plate", "view_plate", "__main__",
     ),
 }  # fmt: skip
 MAY_IMPORT = {"tracker": {"tracker"}, "reference": {"reference", "tracker"}, "eval": {"eval", "reference", "tracker"}}
