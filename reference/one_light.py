@@ -12,6 +12,7 @@ from tracker.geometry import Floats
 DARKEST = 8.0  # of 255: darker colours are mostly noise, of which logarithms would make much
 RATIO_SIGMA = 0.08  # how far the log colours of a surface stray where light does not change them
 GAIN_SIGMA, SLOPE_SIGMA = 0.3, 0.2  # how far views differ in a channel, and from one side of the object to the other
+ALIKE = 200  # neighbouring voxels err alike: so many tell of the light what one would
 ROUNDS = 5
 
 
@@ -41,7 +42,7 @@ def in_one_light(
     terms = csr_array((values, (np.tile(rows, 4), columns)), shape=(len(rows), 6 * count))
     voxels = csr_array((np.ones(len(rows)), (rows, 3 * np.tile(voxel, 3) + channel)))
     share, trust = np.tile(mean.total / mean.total.mean(), 3), np.ones(len(rows))
-    prior = np.diag(np.tile([GAIN_SIGMA**-2] * 3 + [SLOPE_SIGMA**-2] * 3, count)) * RATIO_SIGMA**2
+    prior = np.diag(np.tile([GAIN_SIGMA**-2] * 3 + [SLOPE_SIGMA**-2] * 3, count)) * RATIO_SIGMA**2 * ALIKE
     light = np.zeros(6 * count)
     for _ in range(ROUNDS):
         weight = diags_array(trust * share)

@@ -32,9 +32,9 @@ ORDER = {
         "projection", "least_squares", "closest_points", "threads", "umeyama", "hypotheses", "registration",
         "camera_motion", "claims", "whereabouts", "silhouette", "proposals", "lighting", "surroundings",
         "verification", "glance", "contacts", "refinement", "confidence", "pose_filter", "rest", "config", "result",
-        "smoothing", "stopwatch", "search", "found", "belief", "looking", "lockstep", "places", "reviews", "track",
-        "pipeline", "remote_control", "bop_rows", "pose_files", "ros_results", "output", "saved_run", "overlay",
-        "video", "rerun_log", "viewer", "web", "terminal", "__main__",
+        "smoothing", "stopwatch", "search", "found", "rivals", "belief", "looking", "lockstep", "places", "reviews",
+        "track", "pipeline", "remote_control", "bop_rows", "pose_files", "ros_results", "output", "saved_run",
+        "overlay", "video", "rerun_log", "viewer", "web", "terminal", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "planes",

@@ -228,26 +228,6 @@ def test_of_which_hardly_any_surface_is_in_place_is_not_the_likeliest_whatever_i
     assert confidence(Grounds(hardly.evidence, 0.01)) > confidence(Grounds(fits.evidence, 0.01))
 
 
-@pytest.mark.parametrize(
-    ("turn_rad", "shift_m", "score", "is_rival"),
-    [(0.8, 0.0, 0.7, True), (0.8, 0.0, 0.63, False), (0.1, 0.0, 0.7, False), (0.8, 0.3, 0.7, False)],
-)
-def test_what_explains_clearly_more_and_is_turned_otherwise_is_a_rival(
-    turn_rad: float, shift_m: float, score: float, is_rival: bool, can_model: ConceptModel, can_view: ObjectView
-) -> None:
-    def found(pose: Pose, evidence: Evidence) -> Found:
-        refined = Refined(pose, np.eye(6), np.zeros((0, 6)), 0.0, 100)
-        hypothesis = Hypothesis(refined, evidence, "turn", can_view)
-        return Found(hypothesis, Grounds(evidence, 0.01), 0.9, expected=True, masked=False)
-
-    looking, pose = Looking(can_model, TrackerConfig()), Pose(np.eye(3), np.array((0, 0, 0.7)))
-    astray = found(pose, GOOD)
-    other = found(pose.nudged(np.array((turn_rad, 0, 0, shift_m, 0, 0))), replace(GOOD, score=score))
-    looking.tried.extend((astray, other))
-    assert looking.rival(astray) == (other.hypothesis.refined.T_cam_obj if is_rival else None)
-    assert looking.rival(other) is None
-
-
 def test_what_a_search_finds_where_it_was_expected_has_not_jumped(
     can_looking: Counted, can_frames: list[Frame], can_truth: Pose
 ) -> None:

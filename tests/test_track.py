@@ -17,7 +17,6 @@ from tracker.first_masks import FirstMasks
 from tracker.found import Look
 from tracker.frame import Frame
 from tracker.geometry import Pose
-from tracker.looking import Looking
 from tracker.pipeline import ObjectTracker
 from tracker.pointing import Click, Pointer
 from tracker.result import TrackResult, TrackState
@@ -61,7 +60,7 @@ def test_a_rival_is_compared_in_the_next_frame_where_there_is_a_prior(
     tracker = ObjectTracker(can_model, TrackerConfig(prior=prior))
     tracker.step(can_frames[0])
     turned = can_truth.nudged(np.array((0.0, 0.6, 0, 0, 0, 0)))
-    monkeypatch.setattr(Looking, "rival", lambda *_: turned)
+    monkeypatch.setattr("tracker.track.rival", lambda *_: turned)
     tracker.step(can_frames[1])
     monkeypatch.undo()
     (result,) = tracker.step(can_frames[2])

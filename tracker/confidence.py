@@ -55,6 +55,11 @@ def confidence(grounds: Grounds) -> float:
     return float(1 / (1 + np.exp(-grounds.measures() @ WEIGHTS)))
 
 
+def odds(grounds: Grounds) -> float:
+    """The same as how many times likelier it is right than wrong."""
+    return float(np.exp(grounds.measures() @ WEIGHTS))
+
+
 def _log_odds(share: float) -> float:
     share = float(np.clip(share, LEAST, 1 - LEAST))
     return float(np.log(share / (1 - share)))

@@ -18,6 +18,7 @@ from tracker.config import TrackerConfig
 from tracker.found import Found, Look, Usual
 from tracker.frame import Frame, Mask
 from tracker.geometry import Pose
+from tracker.rivals import CLEARLY_MORE, TURNED_RAD, told_apart
 from tracker.saliency import Saliency
 from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
@@ -27,8 +28,6 @@ MOST_TRIED = 64  # poses that are remembered
 REMEMBERED = 30  # frames in which it was followed: a second of a usual camera
 STEADY_RAD = 0.15  # a pose farther than this from the expected one is a surprise
 ASKED_LATELY = 3  # frames: what concepts could not explain they cannot in the next ones
-CLEARLY_MORE = 0.05  # has a rival to explain: the evidence of one pose differs less by what moves it a bit
-TURNED_RAD = 0.175  # a pose farther than this from a right one is wrong
 ALIKE_RAD = 0.5  # an object that is lost is not expected to be turned by more meanwhile
 
 T = TypeVar("T")
@@ -38,7 +37,8 @@ Asking = Generator[ObjectView, Saliency | None, T]
 
 class Looking:
     """For one model. waiting: whether it did without concepts that it asked for, since somebody set that to False.
-    tried: what was found lately, believed or not, since somebody cleared it."""
+    tried: what was found lately, believed or not, since somebody cleared it. told_apart: in [0, 1], how surely what was
+    believed is told from what is turned otherwise, as it was when that was tried last."""
 
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
@@ -48,6 +48,7 @@ class Looking:
         self._looked: deque[Usual] = deque(maxlen=REMEMBERED)  # while it was followed
         self.waiting = False
         self.tried: deque[Found] = deque(maxlen=MOST_TRIED)
+        self.told_apart = 1.0
 
     def best(self, looks: Iterable[Look | str], frame: Frame, clock: Stopwatch) -> Asking[Found | str]:
         """The likeliest of what the looks find, no further than the first that leaves no doubt; or why there is
@@ -68,6 +69,8 @@ class Looking:
     def came_of_it(self, found: Found | None) -> None:
         """What was believed, None where the object is lost: next time every place is looked at then."""
         self._usual = 1.0 if found is None else found.score
+        if found is not None and found.saliency is not None:
+            self.told_apart = told_apart(found, self.tried, self._model)
         if found is not None:
             evidence, usual = found.hypothesis.evidence, found.usual
             if usual is None or found.explains > AS_EXPLAINED * usual.explains:  # else it hardly shows, or is another
@@ -80,15 +83,6 @@ class Looking:
     def concepts_asked(self) -> None:
         """Somebody else has done so."""
         self._without_concepts = 0
-
-    def rival(self, found: Found) -> Pose | None:
-        """T_cam_obj of what was tried in this frame about there, is turned otherwise, explains clearly more of it than
-        what was found, and was thought less likely for being unexpected alone. What is found may have turned astray."""
-        pose = found.hypothesis.refined.T_cam_obj
-        best = max(self.tried, key=lambda tried: tried.explains, default=found)
-        other = self._model.symmetry.nearest(best.hypothesis.refined.T_cam_obj, pose)
-        turned = other.angle_to_rad(pose) > TURNED_RAD and other.distance_to_m(pose) < self._model.diameter_m / 4
-        return other if turned and best.explains > found.explains + CLEARLY_MORE else None
 
     def outline(self, T_cam_obj: Pose, frame: Frame, clock: Stopwatch) -> Mask | str:
         """See `Search.outline`."""

@@ -21,6 +21,7 @@ from tracker.pointing import Pointer
 from tracker.pose_filter import PoseFilter
 from tracker.result import Surface, TrackResult, TrackState
 from tracker.reviews import Review, SecondLook
+from tracker.rivals import rival
 
 logger = logging.getLogger(__name__)
 
@@ -175,15 +176,15 @@ class Track:
         self.shown, self.surest = view.mask, (self._frames_followed > 1, found.confidence)
         self._look.came_of_it(found)
         self._places.found(refined, now)
-        rival = self._look.rival(found) if self._config.prior else None
-        if rival:
-            self._places.suspected(rival, now.camera.now, now.camera)
+        better = rival(found, self._look.tried, self._model) if self._config.prior else None
+        if better:
+            self._places.suspected(better, now.camera.now, now.camera)
         return TrackResult(
             stamp_ns=stamp_ns,
             object_id=self._model.object_id,
             pose=filtered.T_cam_obj,
             state=self._state,
-            confidence=found.confidence,
+            confidence=found.confidence * self._look.told_apart,
             covariance=filtered.covariance,
             reason=f"found by {found.hypothesis.origin}",
             raw_pose=raw,
