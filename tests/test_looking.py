@@ -155,6 +155,35 @@ def test_where_concepts_lead_astray_what_surface_and_colours_lead_to_is_kept(
     assert can_looking.asked == 1
 
 
+def test_what_concepts_could_not_explain_they_are_asked_again_some_frames_later(
+    can_model: ConceptModel,
+    attributes: SaliencyBackend,
+    can_frames: list[Frame],
+    can_truth: Pose,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tracker.looking.LEAST_ENDS", 2.0)  # nothing explains so much
+    looking, asked = Counted(can_model, attributes, TrackerConfig(concepts_every=100)), []
+    for _ in range(6):
+        looking([Look(can_frames[0].masks[CAN], can_truth, (can_truth,), masked=True)], can_frames[0])
+        asked.append(looking.asked)
+    assert asked == [1, 1, 1, 1, 2, 2]
+
+
+def test_what_is_turned_otherwise_and_fits_as_well_is_remembered_until_it_is_tried_again(
+    can_looking: Counted, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looking, look = can_looking.looking, Look(can_frames[0].masks[CAN], None, masked=True)
+    for share in (0.4, 0.9):
+        monkeypatch.setattr("tracker.looking.told_apart", lambda *_, share=share: share)
+        found = can_looking([look], can_frames[0])
+        assert isinstance(found, Found)
+        looking.came_of_it(found)
+        assert looking.told_apart == share
+        looking.came_of_it(replace(found, saliency=None))  # concepts were not asked: nothing else was tried
+        assert looking.told_apart == share
+
+
 def test_what_is_far_from_where_it_was_expected_is_less_likely(
     can_looking: Counted, can_frames: list[Frame], can_truth: Pose
 ) -> None:

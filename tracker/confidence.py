@@ -27,11 +27,12 @@ LEAST = 0.02  # a share or an angle nearer to 0 than this says no more than this
 class Grounds:
     """What speaks for a pose. evidence: of the picture. turn_sigma_rad: standard deviation of its rotation, by the
     information that refinement had. turn_rad: angle from the nearest pose that was expected, modulo the symmetry; None
-    where none was."""
+    where none was. told_apart: in [0, 1], how surely it is told from poses that are turned otherwise."""
 
     evidence: Evidence
     turn_sigma_rad: float
     turn_rad: float | None = None
+    told_apart: float = 1.0
 
     def measures(self) -> Floats:
         """(M,) what the confidence is a function of: in the order of `MEASURES`."""
@@ -52,11 +53,11 @@ def turn_sigma_rad(refined: Refined, symmetry: Symmetry) -> float:
 
 def confidence(grounds: Grounds) -> float:
     """In [0, 1]."""
-    return float(1 / (1 + np.exp(-grounds.measures() @ WEIGHTS)))
+    return float(grounds.told_apart / (1 + np.exp(-grounds.measures() @ WEIGHTS)))
 
 
 def odds(grounds: Grounds) -> float:
-    """The same as how many times likelier it is right than wrong."""
+    """How many times likelier it is right than wrong, by the measures."""
     return float(np.exp(grounds.measures() @ WEIGHTS))
 
 

@@ -43,7 +43,7 @@ class Looking:
     def __init__(self, model: ConceptModel, config: TrackerConfig) -> None:
         self._model, self._config = model, config
         self._search, self._centre_m = Search(model, config), model.points.mean(axis=0)
-        self._without_concepts = 0  # looks in a row that did without
+        self._asked, self._without_concepts = False, 0  # ever; looks in a row that did without
         self._usual = 0.0  # score of what was believed last
         self._looked: deque[Usual] = deque(maxlen=REMEMBERED)  # while it was followed
         self.waiting = False
@@ -81,8 +81,8 @@ class Looking:
         self._looked.clear()
 
     def concepts_asked(self) -> None:
-        """Somebody else has done so."""
-        self._without_concepts = 0
+        """And answered."""
+        self._asked, self._without_concepts = True, 0
 
     def outline(self, T_cam_obj: Pose, frame: Frame, clock: Stopwatch) -> Mask | str:
         """See `Search.outline`."""
@@ -129,7 +129,7 @@ class Looking:
         if saliency is None:
             self.waiting = True
             return best or "its concepts are not known yet"
-        self._without_concepts = 0
+        self.concepts_asked()
         with clock("cloud"):
             cloud = lift(view, saliency, self._config.cloud)
         if len(cloud) < LEAST_POINTS:
@@ -168,7 +168,8 @@ class Looking:
         a plain cup slide around its axis until the handle is out of sight; and what a pose leaves unexplained may be a
         side that the model does not know, or one that it knows at another pose."""
         steady = continued.grounds.turn_rad is not None and continued.grounds.turn_rad < STEADY_RAD
-        mostly = continued.hypothesis.evidence.explained >= LEAST_ENDS or self._without_concepts < ASKED_LATELY
+        lately = self._asked and self._without_concepts < ASKED_LATELY
+        mostly = continued.hypothesis.evidence.explained >= LEAST_ENDS or lately
         return steady and mostly and self._clear(continued) and continued.confidence >= self._config.sure
 
     def _found(self, hypothesis: Hypothesis, look: Look) -> Found:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import TypeGuard
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from tracker.belief import MOST_DOUBTFUL, believed, doubt, doubtful
 from tracker.camera_motion import CameraMotion
 from tracker.concept import ConceptModel
+from tracker.confidence import confidence
 from tracker.config import TrackerConfig
 from tracker.found import Attempt, Found, Look
 from tracker.frame import Mask
@@ -175,6 +177,7 @@ class Track:
         self._frames_doubtful = self._frames_doubtful + 1 if doubtful(found, self._config) else 0
         self.shown, self.surest = view.mask, (self._frames_followed > 1, found.confidence)
         self._look.came_of_it(found)
+        grounds = replace(found.grounds, told_apart=self._look.told_apart)
         self._places.found(refined, now)
         better = rival(found, self._look.tried, self._model) if self._config.prior else None
         if better:
@@ -184,11 +187,11 @@ class Track:
             object_id=self._model.object_id,
             pose=filtered.T_cam_obj,
             state=self._state,
-            confidence=found.confidence * self._look.told_apart,
+            confidence=confidence(grounds),
             covariance=filtered.covariance,
             reason=f"found by {found.hypothesis.origin}",
             raw_pose=raw,
-            grounds=found.grounds,
+            grounds=grounds,
             timings_ms=now.clock.timings_ms(),
             surface=Surface(
                 self._model, np.where(view.inside, view.depth_m, np.float32(0)), view.camera, found.saliency
