@@ -103,7 +103,7 @@ class Tracer:
         if self._error_m(reached, truth) > WRONG_M:
             alike = adds(self._shape.points_m, [reached], [truth])[0] <= WRONG_M
             return "turn" if alike else "refinement"
-        if found.grounds is None or self._likely(at_truth) > confidence(replace(found.grounds, turn_rad=None)):
+        if found.grounds is None or self._likely(at_truth) > confidence(Grounds(found.grounds.evidence, found.grounds.turn_sigma_rad)):
             return "matching" if self._right_share(view, truth) < ENOUGH_RIGHT else "candidates"
         seen, known = found.grounds.evidence, at_truth.evidence
         return "colour" if seen.surface <= known.surface else "surface"
