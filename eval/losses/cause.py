@@ -22,7 +22,7 @@ from tracker.matching import Matcher
 from tracker.pipeline import ObjectTracker
 from tracker.result import TrackResult
 from tracker.saliency import Query, SaliencyBackend
-from tracker.search import Hypothesis, Search, Sight
+from tracker.search import Search, Sight
 from tracker.silhouette import Silhouette
 from tracker.stopwatch import Stopwatch
 from tracker.view import ObjectView, view_object
@@ -103,14 +103,13 @@ class Tracer:
         if self._error_m(reached, truth) > WRONG_M:
             alike = adds(self._shape.points_m, [reached], [truth])[0] <= WRONG_M
             return "turn" if alike else "refinement"
-        if found.grounds is None or self._likely(at_truth) > confidence(Grounds(found.grounds.evidence, found.grounds.turn_sigma_rad)):
-            return "matching" if self._right_share(view, truth) < ENOUGH_RIGHT else "candidates"
-        seen, known = found.grounds.evidence, at_truth.evidence
-        return "colour" if seen.surface <= known.surface else "surface"
-
-    def _likely(self, at_truth: Hypothesis) -> float:
+        told = found.grounds
         sigma_rad = turn_sigma_rad(at_truth.refined, self._model.symmetry)
-        return confidence(Grounds(at_truth.evidence, sigma_rad))
+        likely = confidence(Grounds(at_truth.evidence, sigma_rad))
+        if told is None or likely > confidence(Grounds(told.evidence, told.turn_sigma_rad)):
+            return "matching" if self._right_share(view, truth) < ENOUGH_RIGHT else "candidates"
+        seen, known = told.evidence, at_truth.evidence
+        return "colour" if seen.surface <= known.surface else "surface"
 
     def _right_share(self, view: ObjectView, truth: Pose) -> float:
         (saliency,) = self._backend([Query(view, self._model.labels)])
