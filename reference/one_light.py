@@ -46,13 +46,12 @@ def in_one_light(
     light = np.zeros(6 * count)
     for _ in range(ROUNDS):
         weight = diags_array(trust * share)
-        of_voxels = (voxels.T @ weight @ terms).toarray()  # what is left where a voxel is the mean of its views
-        mean_of = of_voxels.T / (voxels.T @ weight).sum(axis=1)
-        normal_matrix = (terms.T @ weight @ terms).toarray() - mean_of @ of_voxels
-        pull = terms.T @ weight @ measured - mean_of @ (voxels.T @ weight @ measured)
-        light = np.linalg.solve(normal_matrix + prior, pull)
+        gather = voxels.T @ weight
+        mean_of = (gather @ terms).toarray().T / gather.sum(axis=1)  # a voxel is the mean of its views
+        matrix = (terms.T @ weight @ terms).toarray() - mean_of @ (gather @ terms)
+        light = np.linalg.solve(matrix + prior, terms.T @ weight @ measured - mean_of @ (gather @ measured))
         left = measured - terms @ light
-        left -= voxels @ ((voxels.T @ weight @ left) / (voxels.T @ weight).sum(axis=1))
+        left -= voxels @ ((gather @ left) / gather.sum(axis=1))
         trust = 1 / (1 + (left / RATIO_SIGMA) ** 2)
     gains, slopes = np.split(light.reshape(count, 6), 2, axis=1)
     lit = gains[views] + (slopes[views] * normals).sum(axis=1, keepdims=True)

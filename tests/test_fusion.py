@@ -88,14 +88,13 @@ def test_what_is_fused_is_made_of_what_was_seen(balls: list[PosedFrame], clouds:
     points = np.concatenate([b.T_cam_obj.inverse() @ c.points for b, c in zip(balls, clouds, strict=True)])
     assert KDTree(points).query(fused.points)[0].max() < 0.002
     assert np.quantile(KDTree(fused.points).query(points)[0], 0.98) < 0.002
+    for name, slack in (("colours", 0.5), ("saliency", 1e-4)):  # of colours the light is taken off, though here is none
+        seen = np.concatenate([getattr(cloud, name) for cloud in clouds])
+        assert (getattr(fused, name) >= seen.min(axis=0) - slack).all()
+        assert (getattr(fused, name) <= seen.max(axis=0) + slack).all()
     nearest = KDTree(points).query(fused.points)[1]
-    seen = np.concatenate([cloud.saliency for cloud in clouds])
-    assert (fused.saliency >= seen.min(axis=0) - 1e-4).all()
-    assert (fused.saliency <= seen.max(axis=0) + 1e-4).all()
-    colours = np.concatenate([cloud.colours for cloud in clouds])[nearest]
-    lit = np.log(np.maximum(fused.colours, 20) / np.maximum(colours, 20))  # they are what was seen up to the light
-    assert np.median(np.abs(lit - np.median(lit))) < 0.12
-    assert abs(np.median(lit)) < 0.1
+    apart = np.abs(fused.colours - np.concatenate([cloud.colours for cloud in clouds])[nearest])
+    assert np.median(apart) < 1.0
     assert fused.colours.dtype == fused.saliency.dtype == np.float32
 
 

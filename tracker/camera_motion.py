@@ -83,7 +83,7 @@ def _motion(then: Landmarks, now: Landmarks) -> Pose | None:
     (points_then, was), (points_now, is_now) = then.found, now.found
     if min(len(was), len(is_now)) < LEAST_FEATURES:
         return None
-    matches = cv2.BFMatcher(cv2.NORM_HAMMING).match(was, is_now)
+    matches = cv2.BFMatcher(cv2.NORM_HAMMING).match(was, is_now)  # one way: sampling sorts out what is not mutual
     if len(matches) < LEAST_FEATURES:
         return None
     matches = sorted(matches, key=lambda match: match.distance)[:MOST_MATCHES]
