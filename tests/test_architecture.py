@@ -34,7 +34,7 @@ ORDER = {
         "verification", "glance", "contacts", "refinement", "confidence", "pose_filter", "rest", "config", "result",
         "smoothing", "stopwatch", "search", "found", "rivals", "belief", "looking", "lockstep", "places", "reviews",
         "track", "pipeline", "remote_control", "bop_rows", "pose_files", "ros_results", "output", "saved_run",
-        "overlay", "video", "rerun_log", "viewer", "web", "terminal", "__main__",
+        "overlay", "video", "rerun_log", "viewer", "web", "terminal", "summary", "frame_by_frame", "__main__",
     ),
     "reference": (
         "vocabulary", "prompts", "llm", "vocabulary_cache", "viewsphere", "cross_check", "keyframes", "planes",

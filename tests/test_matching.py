@@ -244,3 +244,13 @@ def test_matching_by_binary_maps_forgets_how_strong_a_concept_is() -> None:
     assert found[True].model_index.tolist() == [0, 1, 2]
     assert found[True].divergence == pytest.approx(0, abs=1e-6)
     assert (found[False].divergence > 0.1).all()
+
+
+@given(SEEDS, st.integers(3, 60))
+def test_of_a_few_points_each_is_matched_as_it_is_among_all(seed: int, most: int) -> None:
+    matcher, cloud = Matcher(model_with(maps(seed, 40)), MatchingConfig(), CPU), cloud_with(maps(seed + 1, 50))
+    few, every = matcher(cloud, most), matcher(cloud)
+    assert len(few) == min(most, 50)
+    assert few.query_index[0] == 0
+    assert few.query_index[-1] == 49
+    assert few.model_index.tolist() == every.model_index[few.query_index].tolist()

@@ -496,12 +496,11 @@ def test_a_recorded_scene_is_tracked_as_the_scene_itself(
         assert {result.state for result in results} == {TrackState.TRACKING}
         poses.append([result.pose for result in results])
     assert len(poses[1]) == len(can_frames)
-    for k, (direct, played) in enumerate(zip(*poses, strict=True)):
+    for direct, played in zip(*poses, strict=True):
         assert direct is not None
         assert played is not None
         assert direct.distance_to_m(played) < 0.0001
-        # depth is rounded, so that a search may begin elsewhere, and refinement ends within a part of a pixel
-        assert np.degrees(direct.angle_to_rad(played)) < (0.1 if k else 1.0)
+        assert np.degrees(direct.angle_to_rad(played)) < 0.1
 
 
 def test_colours_of_half_the_resolution_are_rgb_too(watch: Callable[..., Watching]) -> None:

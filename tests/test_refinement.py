@@ -92,6 +92,22 @@ def test_where_refinement_ends_hardly_depends_on_where_it_began(
         assert degrees < 0.5
 
 
+def test_where_it_is_settled_does_not_depend_on_where_it_began(
+    can_model: ConceptModel, can_view: ObjectView, can_truth: Pose
+) -> None:
+    refiner, appearance = Refiner(can_model, CONFIG, ACROSS), ViewAppearance(can_view)
+    ends = []
+    for seed in range(6):
+        nearly = refiner(can_truth.nudged(off(seed, 3, 0.003)), can_view, appearance)
+        assert nearly is not None
+        ends.append(refiner.settled(nearly.T_cam_obj, can_view, appearance))
+    for end in ends[1:]:
+        assert ends[0] is not None
+        millimetres, degrees = errors(end, ends[0].T_cam_obj)
+        assert millimetres < 0.02
+        assert degrees < 0.1
+
+
 @pytest.mark.parametrize("name", ["mug", "tea_box"])
 def test_objects_among_clutter_are_brought_back(
     name: str, table_scene: SyntheticScene, table_models: dict[str, ConceptModel]

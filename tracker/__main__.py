@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
-from rich.table import Table
 
-from tracker.terminal import ALWAYS, STDERR, hush, progress, run
+from tracker.terminal import STDERR, hush, progress, run
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
     from tracker.pipeline import ObjectTracker
     from tracker.region import Region
     from tracker.remote_control import RemoteControl
-    from tracker.result import TrackResult
     from tracker.sources import FrameSource
     from tracker.viewer import Viewer
     from tracker.web.server import WebPage
@@ -91,8 +88,9 @@ class Track:
 
         from tracker.concept import ConceptModel, told_apart
         from tracker.config import dump_config
-        from tracker.errors import ConfigError, TrackerError
+        from tracker.errors import ConfigError
         from tracker.first_masks import FirstMasks
+        from tracker.frame_by_frame import FrameByFrame
         from tracker.in_order import InOrder
         from tracker.latest import Latest
         from tracker.output import result_folder
@@ -102,6 +100,7 @@ class Track:
         from tracker.saliency import BackendOptions, open_backend
         from tracker.saved_run import SavedRun
         from tracker.sources import LiveSource, length_of
+        from tracker.summary import Summary, tell_left_out
         from tracker.viewer import Several
 
         hush(self.quiet or self.json)
@@ -114,8 +113,7 @@ class Track:
         source = self._opened_source()
         live = Latest(source) if isinstance(source, LiveSource) else None
         pointed_out = parse_pointers(self.at, [model.object_id for model in models])
-        summary, first_masks = _Summary(), FirstMasks(pointed_out)
-        failure: TrackerError | None = None
+        summary = Summary()
         with ExitStack() as stack:
             worker = stack.enter_context(ThreadPoolExecutor(1)) if self.concepts == "later" else None
             tracker = ObjectTracker(models, config, backend, worker)
@@ -136,28 +134,11 @@ class Track:
             shown = progress(coming, length_of(source), "tracking", summary.now)
             frames = InOrder(shown, live=live is not None)
             outputs = self._outputs(stack, folder, source, models, regions)
-            try:
-                for frame in frames:
-                    results = tracker.step(frame if config.masks == "given" else first_masks(frame))
-                    viewer.show(frame, results, {})
-                    for result in results:
-                        summary.add(result)
-                    for output in outputs:
-                        output.add(frame, results)
-                    if live:
-                        summary.latencies_ms.append(live.latency_ms())
-                    remote.carry_out(tracker)
-                if page:
-                    STDERR.print("there are no more frames; the page stays until ctrl-C")
-                    page.stay("there are no more frames")
-            except KeyboardInterrupt:
-                kept = "what was tracked is kept" if folder or self.record or self.rrd else "nothing was to be kept"
-                ALWAYS.print(f"stopped; {kept}")
-            except TrackerError as error:  # a frame that cannot be read does not cost those before it
-                failure = error
-            for output in outputs:
-                output.finish()
-        _tell(frames.refused, live.left_out if live else {}, tracker.frames_without_concepts)
+            masks = FirstMasks(pointed_out) if config.masks == "carried" else None
+            latency_ms = live.latency_ms if live else None
+            follow = FrameByFrame(tracker, masks, viewer, outputs, remote, summary, latency_ms, page)
+            failure = follow(frames, kept=bool(folder or self.record or self.rrd))
+        tell_left_out(frames.refused, live.left_out if live else {}, tracker.frames_without_concepts)
         if failure:
             raise failure
         STDERR.print(summary.table("its stamp" if live and live.stamped else "its arrival"))
@@ -249,51 +230,6 @@ class Track:
         if self.smooth != "off" and not config.prior:
             raise ConfigError(f"--smooth {self.smooth} smooths what is followed through time: it needs --prior on")
         return config
-
-
-def _tell(refused: int, left_out: Mapping[str, int], without_concepts: int) -> None:
-    """Which frames were not tracked, or not as they should be, and how many, if any."""
-    counts = {
-        "left out: they came late, or with the stamp of another": refused,
-        **left_out,
-        "went without concepts that were asked for": without_concepts,
-    }
-    for what, count in counts.items():
-        if count:
-            ALWAYS.print(f"{count} frames {what}")
-
-
-@dataclass
-class _Summary:
-    """What is told at the end."""
-
-    states: Counter[tuple[str, str]] = field(default_factory=Counter)
-    times_ms: dict[str, list[float]] = field(default_factory=dict)
-    latencies_ms: list[float] = field(default_factory=list)
-    last: dict[str, str] = field(default_factory=dict)
-
-    def add(self, result: TrackResult) -> None:
-        object_id, state = result.object_id, result.state.value
-        self.states[object_id, state] += 1
-        self.times_ms.setdefault(object_id, []).append(result.timings_ms["total"])
-        self.last[object_id] = state
-
-    def now(self) -> str:
-        """How many objects are in which state."""
-        return ", ".join(f"{count} {state}" for state, count in Counter(self.last.values()).items())
-
-    def table(self, since: str) -> Table:
-        """since: what the latency is counted from."""
-        import numpy as np
-
-        table = Table("object", "frames", "tracking", "lost", "median ms", title="tracked")
-        for object_id, times_ms in self.times_ms.items():
-            tracking, lost = self.states[object_id, "tracking"], self.states[object_id, "lost"]
-            table.add_row(object_id, str(len(times_ms)), str(tracking), str(lost), f"{np.median(times_ms):.1f}")
-        if self.latencies_ms:
-            median, p95 = np.percentile(self.latencies_ms, (50, 95))
-            table.caption = f"a frame's result comes {median:.0f} ms after {since} (median; 95 %: {p95:.0f} ms)"
-        return table
 
 
 def main() -> None:

@@ -18,8 +18,9 @@ SAME_SIDE = 0.3  # least cosine between the normals of two points that may be th
 
 class ClosestPointsConfig(BaseModel):
     """cloud_points: how many take part. steps: iterations of ICP; reach_start, reach_end: distance at which a pair
-    stops counting, as shares of the diameter, from the first to the last. concept_steps, concept_reach_start,
-    concept_reach_end: the same for the pull by concepts."""
+    stops counting, as shares of the diameter, from the first to the last. concept_points, concept_steps,
+    concept_reach_start, concept_reach_end: the same for the pull by concepts: where it is known about where the object
+    is, a few correspondences say as much as many."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -27,6 +28,7 @@ class ClosestPointsConfig(BaseModel):
     steps: int = Field(default=8, ge=0)
     reach_start: float = Field(default=0.12, gt=0)
     reach_end: float = Field(default=0.04, gt=0)
+    concept_points: int = Field(default=500, ge=50)
     concept_steps: int = Field(default=6, ge=0)
     concept_reach_start: float = Field(default=0.3, gt=0)
     concept_reach_end: float = Field(default=0.06, gt=0)

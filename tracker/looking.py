@@ -145,6 +145,9 @@ class Looking:
         if best is None:
             return "poor fit: no pose explains what is seen"
         best = self._likeliest(best, self._search.turned(best.hypothesis, sight, clock), look) or best
+        if best.hypothesis.anywhere:
+            settled = self._search.settled(best.hypothesis, sight, clock)
+            best = self._found(settled, look) if settled else best
         return replace(best, saliency=saliency)
 
     def _likeliest(self, best: Found | None, hypotheses: Iterable[Hypothesis], look: Look) -> Found | None:

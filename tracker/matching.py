@@ -83,9 +83,11 @@ class Matcher:
         self._model = encode_model(log_model, config.measure).T.contiguous()
         self._distinctness = self._look_alikes(model, log_model)
 
-    def __call__(self, cloud: PointCloud) -> Correspondences:
+    def __call__(self, cloud: PointCloud, most: int | None = None) -> Correspondences:
+        """Of the configured number of the cloud's points, or of `most` of them, spread evenly over it."""
         config = self._config
-        chosen = np.linspace(0, len(cloud) - 1, min(len(cloud), config.query_points)).round().astype(np.intp)
+        points = min(len(cloud), most or config.query_points)
+        chosen = np.linspace(0, len(cloud) - 1, points).round().astype(np.intp)
         query = encode_query(self._vectors(cloud.saliency[chosen]), config.measure)
         per_point = min(config.per_point, self._model.shape[1])
         likeness, nearest, backward = self._greatest(query, per_point)

@@ -6,6 +6,7 @@ slide along its face. Gauss-Newton on the picture's own gradients, smoothed firs
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +29,8 @@ GAIN_RANGE = (0.6, 1.6)
 class RefinementConfig(BaseModel):
     """model_points: how many take part. coarse_steps, fine_steps: iterations on smoothed and on fine colours, at most.
     coarse_settled_px, fine_settled_px: a step that moves the object by less, in view pixels, is the last one of these.
+    settling_steps, settled_px: the same, on fine colours, of a pose that was found from scratch: what is followed goes
+    on in the next frame.
     depth_sigma_m: noise of the pooled depth; it is taken to be depth_sigma_coarse times that in the coarse steps.
     lab_sigma: least noise assumed in colour. colour_weight: of the colour terms against the depth term.
     offset_information: how surely colour and depth are registered, in inverse squared view pixels."""
@@ -39,6 +42,8 @@ class RefinementConfig(BaseModel):
     fine_steps: int = Field(default=8, ge=1)
     coarse_settled_px: float = Field(default=0.5, ge=0)
     fine_settled_px: float = Field(default=0.1, ge=0)
+    settling_steps: int = Field(default=30, ge=1)
+    settled_px: float = Field(default=0.02, ge=0)
     depth_sigma_m: float = Field(default=0.0015, gt=0)
     depth_sigma_coarse: float = Field(default=2.0, ge=1)
     lab_sigma: float = Field(default=2.0, gt=0)
@@ -73,9 +78,11 @@ class Refined:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
-    """lab: (3, N) of the points that are aligned. sigma_m: of depth. settled_m: see `RefinementConfig`."""
+    """lab: (3, N) of the points that are aligned, fine or smoothed. sigma_m: of depth. settled_m: see
+    `RefinementConfig`."""
 
     lab: Floats
+    fine: bool
     steps: int
     sigma_m: float
     settled_m: float
@@ -100,14 +107,25 @@ class Refiner:
         sigma_m, pixel_m = config.depth_sigma_m, model.diameter_m / pixels_across
         smoothed_sigma_m = config.depth_sigma_coarse * sigma_m
         self._levels = (
-            _Level(coarse, config.coarse_steps, smoothed_sigma_m, config.coarse_settled_px * pixel_m),
-            _Level(fine, config.fine_steps, sigma_m, config.fine_settled_px * pixel_m),
+            _Level(coarse, False, config.coarse_steps, smoothed_sigma_m, config.coarse_settled_px * pixel_m),
+            _Level(fine, True, config.fine_steps, sigma_m, config.fine_settled_px * pixel_m),
         )
+        self._last = _Level(fine, True, config.settling_steps, sigma_m, config.settled_px * pixel_m)
 
     def __call__(self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance) -> Refined | None:
         """None where too few model points meet the object's pixels."""
+        return self._descended(T_cam_obj, self._levels, view, appearance)
+
+    def settled(self, T_cam_obj: Pose, view: ObjectView, appearance: ViewAppearance) -> Refined | None:
+        """The same to the end, of a refined pose, so that what it comes to hardly depends on where the search began."""
+        return self._descended(T_cam_obj, (self._last,), view, appearance)
+
+    def _descended(
+        self, T_cam_obj: Pose, levels: Sequence[_Level], view: ObjectView, appearance: ViewAppearance
+    ) -> Refined | None:
         linear = None
-        for level, colours in zip(self._levels, (appearance.coarse, appearance.fine), strict=True):
+        for level in levels:
+            colours = appearance.fine if level.fine else appearance.coarse
             for _ in range(level.steps):
                 linear = self._linearise(T_cam_obj, view, colours, level)
                 if linear is None:

@@ -17,7 +17,7 @@ from tracker.contacts import Contacts
 from tracker.frame import Frame, Mask
 from tracker.geometry import Floats, Pose
 from tracker.glance import Glance
-from tracker.matching import Correspondences, Matcher
+from tracker.matching import Matcher
 from tracker.refinement import Refined, Refiner
 from tracker.registration import register
 from tracker.rest import Resting
@@ -71,7 +71,6 @@ class Search:
         self._turns = Turns(model)
         self._glance = Glance(model, self._verify.surface, config.verification, self._device)
         self._touching = Contacts(model, config.contacts, config.registration, self._match, self._glance)
-        self._matched: tuple[PointCloud, Correspondences] | None = None
 
     def outline(self, T_cam_obj: Pose, frame: Frame) -> Mask | str:
         """(H, W) bool, where an object shows that is about at this pose, or why it does not."""
@@ -93,7 +92,8 @@ class Search:
     ) -> list[Hypothesis]:
         """Poses near the prediction, two at most, other than the one that it was continued to: pulled by the concepts
         first, and by_surface alone too."""
-        correspondences = self._correspondences(cloud, clock)
+        with clock("matching"):
+            correspondences = self._match(cloud, self._config.closest_points.concept_points)
         with clock("closest points"):
             pulled = self._closest.align(self._closest.pull(predicted, correspondences, cloud), cloud)
             direct = self._closest.align(predicted, cloud) if by_surface else None
@@ -105,17 +105,20 @@ class Search:
                 reached.append(pose)
         return [hypothesis for hypothesis in found if hypothesis]
 
+    def settled(self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
+        """What it comes to if its refinement does not end early."""
+        with clock("refinement"):
+            refined = self._refine.settled(hypothesis.refined.T_cam_obj, sight.view, sight.appearance)
+        if refined is None:
+            return None
+        with clock("verification"):
+            judged = self._judged(refined, sight, hypothesis.origin)
+        return judged and replace(judged, anywhere=hypothesis.anywhere)
+
     def held(self, refined: Refined | None, resting: Resting, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
         """The pose, as sure as the picture leaves it, held by where it is if it stands still."""
         with clock("verification"):
             return self._judged(resting.held(refined, self._model.symmetry), sight, "stillness")
-
-    def _correspondences(self, cloud: PointCloud, clock: Stopwatch) -> Correspondences:
-        """Which of the cloud's points is which point of the model? Of the last cloud they are kept."""
-        if self._matched is None or self._matched[0] is not cloud:
-            with clock("matching"):
-                self._matched = (cloud, self._match(cloud))
-        return self._matched[1]
 
     def _alike(self, a: Pose, b: Pose) -> bool:
         """So near that refinement brings them to the same pose."""
@@ -123,7 +126,8 @@ class Search:
 
     def anywhere(self, sight: Sight, cloud: PointCloud, clock: Stopwatch) -> list[Hypothesis]:
         """The poses on which correspondences agree, wherever they are, that explain most of what is seen."""
-        correspondences = self._correspondences(cloud, clock)
+        with clock("matching"):
+            correspondences = self._match(cloud)
         with clock("registration"):
             generator = torch.Generator(self._device).manual_seed(self._config.seed)
             candidates = register(correspondences, cloud, self._model, self._config.registration, generator)
