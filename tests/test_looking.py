@@ -178,9 +178,10 @@ def test_what_is_turned_otherwise_and_fits_as_well_is_remembered_until_it_is_tri
         monkeypatch.setattr("tracker.looking.told_apart", lambda *_, share=share: share)
         found = can_looking([look], can_frames[0])
         assert isinstance(found, Found)
+        assert found.told_apart == share
         looking.came_of_it(found)
         assert looking.told_apart == share
-        looking.came_of_it(replace(found, saliency=None))  # concepts were not asked: nothing else was tried
+        looking.came_of_it(replace(found, told_apart=None))  # concepts were not asked: nothing else was tried
         assert looking.told_apart == share
 
 

@@ -89,6 +89,22 @@ def test_a_worker_that_keeps_up_changes_next_to_nothing(
     assert tracker.frames_without_concepts == 0
 
 
+def test_what_fits_otherwise_lowers_the_confidence_once_it_is_known(
+    can_model: ConceptModel, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    worker = Later()
+    tracker = ObjectTracker(can_model, TrackerConfig(concepts_every=3), worker=worker)
+    said = []
+    for frame in can_frames[:6]:
+        said += tracker.step(frame)
+        worker.work()
+        monkeypatch.setattr("tracker.looking.told_apart", lambda *_: 0.4)
+    assert said[1].grounds is not None
+    assert said[1].grounds.told_apart == 1.0
+    assert said[-1].grounds is not None
+    assert said[-1].grounds.told_apart == 0.4
+
+
 def test_a_wrong_pose_is_put_right_by_what_is_known_later(
     can_scene: SyntheticScene, can_model: ConceptModel, can_frames: list[Frame]
 ) -> None:

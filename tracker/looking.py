@@ -64,17 +64,22 @@ class Looking:
                 break
         if best is None:
             return missed or "nothing in the picture looks like it"
-        return replace(best, missed=missed)
+        told = None if best.saliency is None else told_apart(best, self.tried, self._model)
+        return replace(best, missed=missed, told_apart=told)
 
     def came_of_it(self, found: Found | None) -> None:
         """What was believed, None where the object is lost: next time every place is looked at then."""
         self._usual = 1.0 if found is None else found.score
-        if found is not None and found.saliency is not None:
-            self.told_apart = told_apart(found, self.tried, self._model)
         if found is not None:
+            self.tells_apart(found)
             evidence, usual = found.hypothesis.evidence, found.usual
             if usual is None or found.explains > AS_EXPLAINED * usual.explains:  # else it hardly shows, or is another
                 self._looked.append(Usual(found.explains, evidence.colour, evidence.contradicted))
+
+    def tells_apart(self, found: Found) -> None:
+        """What was tried beside it says how surely what is believed, which is the same, is told from others."""
+        if found.told_apart is not None:
+            self.told_apart = found.told_apart
 
     def forget(self) -> None:
         """How it usually looked."""

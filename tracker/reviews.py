@@ -42,6 +42,7 @@ class SecondLook:
         self, looks: Iterable[Look | str], places: Places | None, now: Moment, followed: bool
     ) -> Asking[Found | None]:
         """What is believed of what the looks find, or, where that is nothing, a search of the places; or None."""
+        self._look.tried.clear()
         # Where it stood can be asked in its own frame alone.
         by_itself = [look if isinstance(look, str) else replace(look, rest=None) for look in looks]
         found = yield from self._look.best(by_itself, now.frame, now.clock)

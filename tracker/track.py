@@ -123,7 +123,9 @@ class Track:
         elif review.believed is not None:
             T_then_obj = self._model.symmetry.nearest(T_then_obj, review.believed)
             self._look.concepts_asked()
-            if not self._places.same(T_then_obj, review.believed):
+            if self._places.same(T_then_obj, review.believed):
+                self._look.tells_apart(found)
+            else:
                 self._places.suspected(self._raw @ review.believed.inverse() @ T_then_obj, camera.now, camera)
 
     def withdrawn(self, now: Moment, other_id: str) -> TrackResult:
