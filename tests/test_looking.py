@@ -185,6 +185,24 @@ def test_what_is_turned_otherwise_and_fits_as_well_is_remembered_until_it_is_tri
         assert looking.told_apart == share
 
 
+def test_every_turn_is_tried_where_somebody_says_that_it_is_there_and_while_it_has_rivals(
+    can_looking: Counted, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[bool] = []
+
+    def turned(*_: object, every: bool) -> list[Hypothesis]:
+        asked.append(every)
+        return []
+
+    monkeypatch.setattr(Search, "turned", turned)
+    mask, looking = can_frames[0].masks[CAN], can_looking.looking
+    nobody, somebody = Look(mask, None, masked=True), Look(mask, None, masked=True, told=True)
+    for look, told_apart in ((nobody, 1.0), (somebody, 1.0), (nobody, 0.4)):
+        looking.told_apart = told_apart
+        can_looking([look], can_frames[0])
+    assert asked == [False, True, True]
+
+
 def test_what_is_far_from_where_it_was_expected_is_less_likely(
     can_looking: Counted, can_frames: list[Frame], can_truth: Pose
 ) -> None:
@@ -253,7 +271,7 @@ def test_of_which_hardly_any_surface_is_in_place_is_not_the_likeliest_whatever_i
     fits = Hypothesis(refined, replace(GOOD, colour=0.7), "search", can_view)
     hardly = Hypothesis(refined, replace(GOOD, surface=0.19, colour=0.95, contradicted=0.0), "search", can_view)
     monkeypatch.setattr(Search, "anywhere", lambda *_: [hardly, fits, hardly])
-    monkeypatch.setattr(Search, "turned", lambda *_: [])
+    monkeypatch.setattr(Search, "turned", lambda *_, **__: [])
     found = can_looking([Look(can_frames[0].masks[CAN], None, masked=True)], can_frames[0])
     assert isinstance(found, Found)
     assert found.hypothesis is fits

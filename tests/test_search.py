@@ -18,8 +18,8 @@ from tracker.frame import Frame
 from tracker.geometry import Pose
 from tracker.glance import Glance
 from tracker.registration import Candidate, register
-from tracker.revolution import Turns
-from tracker.search import Hypothesis, Search, Sight
+from tracker.revolution import TURNS, Turns
+from tracker.search import TURNED, Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
 from tracker.symmetry import about
 from tracker.umeyama import Motions
@@ -115,6 +115,17 @@ def test_a_turn_that_leads_back_began_where_the_pose_did(
         (again,) = can_search.turned(found, can_sight, Stopwatch())
         assert again.origin == origin
         assert again.anywhere  # as what it is a turn of
+
+
+def test_every_turn_that_explains_nearly_as_much_is_tried_where_that_is_asked_for(
+    can_search: Search, can_sight: Sight, can_cloud: PointCloud, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = best(can_search.anywhere(can_sight, can_cloud, Stopwatch()))
+    monkeypatch.setattr("tracker.search.NEARLY_AS_GOOD", 0.0)
+    assert len(can_search.turned(found, can_sight, Stopwatch())) == TURNED
+    assert len(can_search.turned(found, can_sight, Stopwatch(), every=True)) == TURNS - 1
+    monkeypatch.setattr("tracker.search.NEARLY_AS_GOOD", 2.0)
+    assert can_search.turned(found, can_sight, Stopwatch(), every=True) == []
 
 
 @pytest.mark.parametrize("angle_deg", [-150, -60, 45, 100])

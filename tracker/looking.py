@@ -149,7 +149,9 @@ class Looking:
                 best = self._likeliest(best, self._search.touching(sight, cloud, clock), look)
         if best is None:
             return "poor fit: no pose explains what is seen"
-        best = self._likeliest(best, self._search.turned(best.hypothesis, sight, clock), look) or best
+        # What is turned wrongly at first is followed so, and what had rivals may have them still.
+        every = (look.told and best.hypothesis.anywhere) or self.told_apart < self._config.sure
+        best = self._likeliest(best, self._search.turned(best.hypothesis, sight, clock, every=every), look) or best
         if best.hypothesis.anywhere:
             settled = self._search.settled(best.hypothesis, sight, clock)
             best = self._found(settled, look) if settled else best

@@ -157,16 +157,18 @@ class Search:
                 reached.append(closer)
         return [replace(hypothesis, anywhere=True) for hypothesis in found if hypothesis]
 
-    def turned(self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> list[Hypothesis]:
-        """The poses that its shape hardly tells from this one, those that explain most of what is seen. One that leads
-        back to it began where it did."""
+    def turned(
+        self, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch, *, every: bool = False
+    ) -> list[Hypothesis]:
+        """The poses that its shape hardly tells from this one: those that explain most of what is seen, or every one
+        that explains nearly as much. One that leads back to it began where it did."""
         turns = self._turns.of(hypothesis.refined.T_cam_obj)
         with clock("verification"):
             own, *worth = self._roughly([hypothesis.refined.T_cam_obj, *turns], sight)
-        chosen: list[Pose] = []
-        for k in np.argsort(worth)[::-1]:
-            likely, pose = worth[k] > NEARLY_AS_GOOD * own, turns[k]
-            if likely and len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
+        likely = [turns[k] for k in np.argsort(worth)[::-1] if worth[k] > NEARLY_AS_GOOD * own]
+        chosen = likely if every else []
+        for pose in likely:
+            if len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
                 chosen.append(pose)
         found = [turned for pose in chosen if (turned := self._refined(pose, sight, "turn", clock))]
         there = hypothesis.refined.T_cam_obj
