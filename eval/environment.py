@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
+import re
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from tracker.whole_file import write_whole
 
+CPUINFO = Path("/proc/cpuinfo")
 PACKAGES = ("conceptrack", "torch", "numpy", "scipy", "open3d", "opencv-python-headless", "small_gicp", "filterpy")
 
 
@@ -24,10 +27,21 @@ def package_versions() -> dict[str, str]:
     return versions
 
 
+def processor() -> str:
+    """Its name and how many cores of it there are to be had; its architecture where the system tells no name."""
+    name = platform.processor() or platform.machine()
+    if CPUINFO.is_file():  # Linux, where Python tells the architecture alone
+        named = re.search(r"^model name\s*:\s*(.+)$", CPUINFO.read_text(), re.MULTILINE)
+        name = named[1] if named else name
+    return f"{name}, {os.cpu_count()} cores"
+
+
 def environment() -> dict[str, str]:
     """Machine and versions."""
     machine = f"{platform.system()} {platform.machine()}"
-    return {"python": platform.python_version(), "machine": machine, **package_versions()}
+    return {
+        "python": platform.python_version(), "machine": machine, "processor": processor(), **package_versions(),
+    }  # fmt: skip
 
 
 def write_figures(path: Path, figures: Mapping[str, object]) -> None:

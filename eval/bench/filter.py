@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import tyro
-from rich.table import Table
-
-from tracker.terminal import STDERR, hush, progress
+from eval.bench.measurement import Measurement, text_of
+from tracker.terminal import progress
 
 STILL, MOVING = "still", "turn?object=tea_box"
 SYMMETRIC = {"bowl": "z:inf", "soup_can": "z:inf"}  # of their shapes: the can's print is declared to be nothing
 
 
 @dataclass
-class FilterBench:
+class FilterBench(Measurement):
     """Follow rendered objects at a usual camera's noise: one that is still (300 frames), one at up to 0.39 m/s, a bowl
     and a can that any turn leaves alike. Poses before the filter, after it, and smoothed, against the true ones."""
 
@@ -24,29 +22,14 @@ class FilterBench:
     """Of the still object; the moving ones have three tenths of them."""
     size: str = "640x480"
     """Of the pictures."""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File for the figures."""
-    overwrite: bool = False
-    """Replace the file if it exists."""
-    quiet: bool = False
-    """Nothing on the terminal but warnings and errors."""
 
-    def __call__(self) -> None:
-        from eval.environment import write_figures
-        from tracker.output import require_free
+    def title(self) -> str:
+        return "the pose over time"
 
-        hush(self.quiet)
-        if self.json:
-            require_free(self.json, self.overwrite)
-        figures = self.measured()
-        table = Table("", "", title="the pose over time", show_header=False)
+    def rows(self, figures: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         for scene, of_scene in figures.items():
             for name, value in of_scene.items():
-                text = f"{value:.3g}" if isinstance(value, float) else str(value)
-                table.add_row(f"{scene.replace('_', ' ')}: {name.replace('_', ' ')}", text)
-        STDERR.print(table)
-        if self.json:
-            write_figures(self.json, figures)
+                yield f"{scene}: {name}", text_of(value)
 
     def measured(self) -> dict[str, Any]:
         from eval.bench.followed import follow, jumps, lag, steadiness

@@ -5,13 +5,10 @@ from __future__ import annotations
 import statistics
 import time
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import tyro
-from rich.table import Table
-
-from tracker.terminal import STDERR, hush, progress
+from eval.bench.measurement import Measurement
+from tracker.terminal import progress
 
 if TYPE_CHECKING:
     from eval.bench.methods import Method
@@ -22,7 +19,7 @@ RATES = ("0.9", "0.95", "0.98")
 
 
 @dataclass
-class RegistrationBench:
+class RegistrationBench(Measurement):
     """Correspondences of which most are wrong: time and success, ours beside open3d's RANSAC, FGR and what else is
     installed of the extra bench; and the time of a global pose and of its refinement."""
 
@@ -32,27 +29,9 @@ class RegistrationBench:
     """Problems over which ours has to succeed."""
     open3d_seeds: int = 8
     """Problems over which the others have to, and over which times are medians."""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File for the figures."""
-    overwrite: bool = False
-    """Replace the file if it exists."""
-    quiet: bool = False
-    """Nothing on the terminal but warnings and errors."""
 
-    def __call__(self) -> None:
-        from eval.environment import write_figures
-        from tracker.output import require_free
-
-        hush(self.quiet)
-        if self.json:
-            require_free(self.json, self.overwrite)
-        figures = self.measured()
-        table = Table("", "", title=f"registration, {self.correspondences} correspondences", show_header=False)
-        for name, value in figures.items():
-            table.add_row(name.replace("_", " "), _text(value))
-        STDERR.print(table)
-        if self.json:
-            write_figures(self.json, figures)
+    def title(self) -> str:
+        return f"registration, {self.correspondences} correspondences"
 
     def measured(self) -> dict[str, Any]:
         from eval.bench.methods import SAMPLES, THRESHOLD_M, open3d_ransac, ours, peers
@@ -120,9 +99,3 @@ class RegistrationBench:
 
 def _finite(value: float) -> float | None:
     return value if value < float("inf") else None
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, dict):
-        return "\n".join(f"{k}: {_text(v)}" for k, v in value.items()).replace("\n  ", ", ")
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -12,13 +12,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
-from rich.table import Table
 
-from tracker.terminal import STDERR, hush
+from eval.bench.measurement import Measurement
 
 
 @dataclass
-class SaliencyBench:
+class SaliencyBench(Measurement):
     """Measure a SigLIP backbone: the whole saliency, one bare forward pass, and the usual loop over concepts."""
 
     weights: str | None = None
@@ -33,37 +32,22 @@ class SaliencyBench:
     """Where the network runs."""
     keep_weights: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Keep the random weights in this folder."""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File for the figures."""
-    overwrite: bool = False
-    """Replace the file if it exists."""
-    quiet: bool = False
-    """Nothing on the terminal but warnings and errors."""
 
-    def __call__(self) -> None:
+    def title(self) -> str:
+        return f"saliency of {self.labels} concepts"
+
+    def measured(self) -> dict[str, Any]:
         from eval.bench.random_network import save_random_siglip
-        from eval.environment import write_figures
-        from tracker.output import require_free
 
-        hush(self.quiet)
-        if self.json:
-            require_free(self.json, self.overwrite)
+        if self.weights is not None:
+            return self._measured(self.weights)
         temporary = tempfile.TemporaryDirectory() if self.keep_weights is None else nullcontext(self.keep_weights)
         with temporary as folder:
-            weights = self.weights
-            if weights is None:
-                weights = str(folder)
-                if not (Path(weights) / "config.json").exists():
-                    save_random_siglip(Path(weights))
-            figures = self.measured(weights)
-        table = Table("", "", title=f"saliency of {self.labels} concepts", show_header=False)
-        for name, value in figures.items():
-            table.add_row(name.replace("_", " "), f"{value:.4g}" if isinstance(value, float) else str(value))
-        STDERR.print(table)
-        if self.json:
-            write_figures(self.json, figures)
+            if not (Path(folder) / "config.json").exists():
+                save_random_siglip(Path(folder))
+            return self._measured(str(folder))
 
-    def measured(self, weights: str) -> dict[str, Any]:
+    def _measured(self, weights: str) -> dict[str, Any]:
         import numpy as np
         import torch
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import tyro
-from rich.table import Table
-
-from tracker.terminal import STDERR, hush, progress
+from eval.bench.measurement import Measurement
+from tracker.terminal import progress
 
 if TYPE_CHECKING:
     from eval.datasets import ObjectModel
@@ -21,7 +18,7 @@ ALL = 10_000
 
 
 @dataclass
-class ScoringBench:
+class ScoringBench(Measurement):
     """Measure every error but VSD of estimates of 21 objects, eight of them symmetric (up to 630 motions each), about
     a centimetre and five degrees off; then each error by itself on a tenth of them."""
 
@@ -29,27 +26,13 @@ class ScoringBench:
     """How many poses; the time is scaled to 10,000."""
     vertices: int = 8000
     """Of each model."""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File for the figures."""
-    overwrite: bool = False
-    """Replace the file if it exists."""
-    quiet: bool = False
-    """Nothing on the terminal but warnings and errors."""
 
-    def __call__(self) -> None:
-        from eval.environment import write_figures
-        from tracker.output import require_free
+    def title(self) -> str:
+        return "seconds for 10,000 poses of 21 objects"
 
-        hush(self.quiet)
-        if self.json:
-            require_free(self.json, self.overwrite)
-        figures = self.measured()
-        table = Table("", "", title="seconds for 10,000 poses of 21 objects", show_header=False)
+    def rows(self, figures: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         for name, seconds in {"all": figures["seconds_for_10000"], **figures["parts"]}.items():
-            table.add_row(name.replace("_", " "), f"{seconds:.1f}")
-        STDERR.print(table)
-        if self.json:
-            write_figures(self.json, figures)
+            yield name, f"{seconds:.1f}"
 
     def measured(self) -> dict[str, Any]:
         from eval.bench.scored_models import CAMERA, OBJECTS, model, poses

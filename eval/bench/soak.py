@@ -9,12 +9,10 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import tyro
-from rich.table import Table
-
-from tracker.terminal import STDERR, hush, progress
+from eval.bench.measurement import Measurement
+from tracker.terminal import progress
 
 if TYPE_CHECKING:
     from tracker.frame import Frame
@@ -26,7 +24,7 @@ STATM = Path("/proc/self/statm")
 
 
 @dataclass
-class SoakBench:
+class SoakBench(Measurement):
     """Carry the masks of several objects through thousands of frames, a rendered scene forth and back, and compare
     memory and speed after the first of them with those at the end."""
 
@@ -38,38 +36,20 @@ class SoakBench:
     """Frames after which memory and speed are to stay as they are."""
     size: str = "640x480"
     """Of the pictures."""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File for the figures."""
-    overwrite: bool = False
-    """Replace the file if it exists."""
-    quiet: bool = False
-    """Nothing on the terminal but warnings and errors."""
 
-    def __call__(self) -> None:
-        from eval.environment import write_figures
-        from tracker.errors import ConfigError
-        from tracker.output import require_free
-
-        hush(self.quiet)
-        if self.frames < 2 * self.settled or self.settled < 1:
-            raise ConfigError(f"--frames: at least twice the {self.settled} settled ones are needed, got {self.frames}")
-        if self.json:
-            require_free(self.json, self.overwrite)
-        figures = self.measured()
-        table = Table("", "", title=f"{self.frames} frames, {self.objects} objects", show_header=False)
-        for name, value in figures.items():
-            table.add_row(name.replace("_", " "), f"{value:.4g}" if isinstance(value, float) else str(value))
-        STDERR.print(table)
-        if self.json:
-            write_figures(self.json, figures)
+    def title(self) -> str:
+        return f"{self.frames} frames, {self.objects} objects"
 
     def measured(self) -> dict[str, Any]:
         from reference.onboard import onboard, read_reference_frames
         from tracker.config import TrackerConfig
+        from tracker.errors import ConfigError
         from tracker.pipeline import ObjectTracker
         from tracker.saliency import open_backend
         from tracker.sources.synthetic import open_scene
 
+        if self.frames < 2 * self.settled or self.settled < 1:
+            raise ConfigError(f"--frames: at least twice the {self.settled} settled ones are needed, got {self.frames}")
         scene, backend = open_scene(f"{SCENE}?frames={RENDERED}&size={self.size}"), open_backend("attributes")
         object_ids = scene.object_ids[: self.objects]
         models = [onboard(read_reference_frames(scene, object_id, VIEWS), backend) for object_id in object_ids]
