@@ -11,8 +11,7 @@ from transformers import AutoTokenizer, CLIPModel
 from tracker.saliency import BackendOptions
 from tracker.saliency.checkpoint import Published, find_checkpoint
 from tracker.saliency.device import precision, torch_device
-from tracker.saliency.gradcam import GradCam
-from tracker.saliency.siglip2 import square
+from tracker.saliency.gradcam import GradCam, square
 from tracker.saliency.vision_language import VisionLanguage
 
 SIZES = {

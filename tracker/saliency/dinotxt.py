@@ -29,8 +29,7 @@ from tracker.errors import ConfigError
 from tracker.saliency import BackendOptions
 from tracker.saliency.checkpoint import find_checkpoint
 from tracker.saliency.device import precision, torch_device
-from tracker.saliency.gradcam import stretched
-from tracker.saliency.siglip2 import square
+from tracker.saliency.gradcam import square, stretched
 from tracker.saliency.vision_language import VisionLanguage
 
 HEAD_WIDTH = 64  # channels an attention head, as in all of DINOv3's backbones

@@ -107,3 +107,9 @@ def stretched(maps: torch.Tensor) -> torch.Tensor:
     """Every map of (B, L, h, w) stretched to [0, 1]; one that is the same everywhere says nothing: 0."""
     low, high = maps.amin(dim=(2, 3), keepdim=True), maps.amax(dim=(2, 3), keepdim=True)
     return torch.where(high > low, (maps - low) / (high - low).clamp_min(torch.finfo(maps.dtype).tiny), 0.0)
+
+
+def square(tokens: torch.Tensor) -> torch.Tensor:
+    """(B, h * h, C) -> (B, h, h, C), row by row."""
+    side = round(tokens.shape[1] ** 0.5)
+    return tokens.reshape(len(tokens), side, side, tokens.shape[2])

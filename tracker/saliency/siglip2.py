@@ -11,7 +11,7 @@ from transformers import AutoTokenizer, SiglipModel
 from tracker.saliency import BackendOptions
 from tracker.saliency.checkpoint import Published, find_checkpoint
 from tracker.saliency.device import precision, torch_device
-from tracker.saliency.gradcam import GradCam, Shortcut
+from tracker.saliency.gradcam import GradCam, Shortcut, square
 from tracker.saliency.vision_language import VisionLanguage
 
 SIZES = {
@@ -76,12 +76,6 @@ def _before_pooling(gradients: torch.Tensor, pooling: torch.nn.MultiheadAttentio
     """
     value = pooling.in_proj_weight[2 * pooling.embed_dim :].float()
     return gradients[:, :, 0].float() @ pooling.out_proj.weight.float() @ value / places
-
-
-def square(tokens: torch.Tensor) -> torch.Tensor:
-    """(B, h * h, C) -> (B, h, h, C), row by row."""
-    side = round(tokens.shape[1] ** 0.5)
-    return tokens.reshape(len(tokens), side, side, tokens.shape[2])
 
 
 def open_siglip2(options: BackendOptions) -> VisionLanguage:
