@@ -14,6 +14,7 @@ from tracker.saliency import Query, SaliencyBackend
 from tracker.view import Float32s, ViewConfig, bounding_box, view_object
 
 TILE_PX, LABEL_PX, GAP_PX = 150, 20, 6
+SCALE_PX = GAP_PX + 2 * LABEL_PX  # the height of what tells which colour is which value
 PAPER, INK = (255, 255, 255), (30, 30, 30)
 LONGEST_LABEL = 22  # characters that fit under a tile
 MOST_COLUMNS = 10
@@ -22,6 +23,7 @@ MOST_COLUMNS = 10
 def write_concept_plate(path: Path, model: ConceptModel, backend: SaliencyBackend) -> None:
     """Write a PNG of the model's reference views. Raises OutputError where it cannot be written."""
     plates = [_plate(view, model, backend) for view in model.references]
+    plates += [_scale()] if plates else []
     width = max((plate.shape[1] for plate in plates), default=1)
     plates = [np.pad(p, ((0, 0), (0, width - p.shape[1]), (0, 0)), constant_values=255) for p in plates]
     whole = np.concatenate(plates) if plates else np.full((1, 1, 3), 255, np.uint8)
@@ -47,9 +49,25 @@ def _plate(frame: PosedFrame, model: ConceptModel, backend: SaliencyBackend) -> 
 def _heated(crop: Picture, saliency: Float32s) -> Picture:
     """The crop in faint gray, under the map from dark to bright; in every tile bright is the same value, 1."""
     gray = cv2.cvtColor(crop, cv2.COLOR_RGB2GRAY)[:, :, None]
+    return (0.3 * gray + 0.7 * _heat(saliency)).astype(np.uint8)
+
+
+def _heat(saliency: Float32s) -> Picture:
+    """(h, w) in [0, 1] -> its colours, even for colour-blind readers."""
     levels = np.rint(np.clip(saliency, 0, 1) * 255).astype(np.uint8)
-    heat = cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)[:, :, ::-1]  # even for colour-blind readers
-    return (0.3 * gray + 0.7 * heat).astype(np.uint8)
+    return np.ascontiguousarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)[:, :, ::-1])
+
+
+def _scale() -> Picture:
+    """Which colour is which value, over the same gray as a tile's, in the middle of what that may be."""
+    tile = np.full((SCALE_PX, TILE_PX, 3), 255, np.uint8)
+    tile[GAP_PX : GAP_PX + LABEL_PX] = _heated(
+        np.full((LABEL_PX, TILE_PX, 3), 128, np.uint8),
+        np.tile(np.linspace(0, 1, TILE_PX, dtype=np.float32), (LABEL_PX, 1)),
+    )
+    for value, left in (("0", 2), ("0.5", TILE_PX // 2 - 10), ("1", TILE_PX - 10)):
+        cv2.putText(tile, value, (left, GAP_PX + LABEL_PX + 14), cv2.FONT_HERSHEY_SIMPLEX, 0.38, INK, 1, cv2.LINE_AA)
+    return tile
 
 
 def _tile(picture: Picture, label: str) -> Picture:
