@@ -10,11 +10,12 @@ from pathlib import Path
 from eval.datasets import Dataset
 from eval.kept_units import KeptUnits
 from eval.occlusion import Occlusion, occlusion
-from eval.predict import Progress, Tracked
+from eval.predict import Progress
 from eval.preset import Preset, Variation, over
 from eval.score import Scores, score
 from eval.spread import Spreading
 from eval.track_run import TrackRun
+from eval.tracked import Tracked
 from eval.units import Unit, UnitsShown, track_units, units_of
 from reference.vocabulary import read_vocabulary
 from tracker.config import parse_config

@@ -20,9 +20,10 @@ from pydantic import TypeAdapter
 
 from eval.bop_results import read_results, write_results
 from eval.frame_record import FrameRecord
-from eval.predict import ObjectInImage, Tracked
+from eval.instances import ObjectInImage
 from eval.summary import TrackingCounts
 from eval.track_run import fingerprint_of
+from eval.tracked import Tracked
 from tracker.errors import OutputError
 from tracker.sources.json_files import DAMAGE
 from tracker.viewer import FRAMES, RECORDING, VIDEO

@@ -13,7 +13,7 @@ from typing import Literal
 from eval.datasets import Dataset, MaskKind, open_dataset
 from eval.environment import package_versions
 from eval.peers import method_kind
-from eval.predict import Protocol
+from eval.protocol import Protocol
 from reference.vocabulary import VocabularySet
 from tracker.config import TrackerConfig, parse_config
 from tracker.errors import ConfigError
@@ -21,7 +21,10 @@ from tracker.saliency import BackendOptions, SaliencyBackend, open_backend
 
 ROOT = Path(__file__).resolve().parents[1]
 # What poses come out of. A page or a table may change without a pose being computed again.
-DECIDE = ("tracker", "reference", "eval/datasets", "eval/peers", "eval/predict.py", "eval/bop_results.py")
+DECIDE = (
+    "tracker", "reference", "eval/datasets", "eval/peers", "eval/protocol.py", "eval/scene_models.py",
+    "eval/tracked.py", "eval/predict.py", "eval/bop_results.py",
+)  # fmt: skip
 MASKS = {
     "visib": "the dataset's visible masks",
     "full": "the dataset's full masks: whole silhouettes, with the pixels of whatever hides the object",
@@ -33,7 +36,7 @@ COMPLETED = "models grow by frames that were tracked, after they were, where the
 
 @dataclass(frozen=True, slots=True)
 class TrackRun:
-    """How a dataset is tracked, by names: `eval.predict.Protocol` has the meaning of the fields, with what was opened.
+    """How a dataset is tracked, by names: `eval.protocol.Protocol` has the meaning of the fields, with what was opened.
 
     dataset: as `eval.datasets` opens it. vocabulary: its name, for the report; vocabularies: what is in it, so that no
     file has to be where a unit is tracked. object_ids: only these. masks: one of `MASKS`. threads: of torch in a

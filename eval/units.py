@@ -11,9 +11,10 @@ from typing import TypeVar
 
 from eval.datasets import require
 from eval.kept_units import KeptUnits
-from eval.predict import Progress, Tracked, track_scene
+from eval.predict import Progress, track_scene
 from eval.spread import Spreading, spread
 from eval.track_run import TrackRun, code_fingerprint, fingerprint_of, opened_backend, opened_dataset
+from eval.tracked import Tracked
 from tracker.errors import ConfigError, TrackerError
 from tracker.threads import torch_threads
 from tracker.viewer import file_viewer

@@ -55,7 +55,7 @@ def _heated(crop: Picture, saliency: Float32s) -> Picture:
 def _heat(saliency: Float32s) -> Picture:
     """(h, w) in [0, 1] -> its colours, even for colour-blind readers."""
     levels = np.rint(np.clip(saliency, 0, 1) * 255).astype(np.uint8)
-    return np.ascontiguousarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)[:, :, ::-1])
+    return np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)[:, :, ::-1], np.uint8)
 
 
 def _scale() -> Picture:

@@ -13,10 +13,11 @@ import eval.__main__
 import eval.units
 from eval.ablation_table import dataset_labels
 from eval.occlusion import line, occlusion
-from eval.predict import Tracked, track_scene
+from eval.predict import track_scene
 from eval.preset import read_preset, shipped_presets
 from eval.score import score
 from eval.track_run import TrackRun, opened_dataset
+from eval.tracked import Tracked
 from eval.units import track_units, units_of
 from tests.tiny_bop import write_bop
 from tracker.config import TrackerConfig, parse_config

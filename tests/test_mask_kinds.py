@@ -15,8 +15,9 @@ import pytest
 import eval.__main__
 import eval.predict
 from eval.datasets import MaskKind, open_dataset
-from eval.predict import Protocol, track_scene
+from eval.predict import track_scene
 from eval.preset import Options
+from eval.protocol import Protocol
 from eval.track_run import MASKS, TrackRun
 from eval.units import units_of
 from tests.tiny_bop import write_bop

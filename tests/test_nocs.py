@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import eval.predict
+import eval.scene_models
 from eval.datasets import category_of, open_dataset
 from eval.datasets.nocs import NocsDataset
-from eval.predict import Protocol, track_scene
+from eval.predict import track_scene
+from eval.protocol import Protocol
 from reference.vocabulary import read_vocabulary
 from tests.recordings import (
     CORNERS_M,
@@ -147,8 +148,8 @@ def test_models_are_made_with_them(nocs: Path, attributes: SaliencyBackend, monk
         (asked[frames[0].object_id],) = settings[-1:]  # pyright: ignore[reportArgumentType]
         raise OnboardingError("five pixels make no model")
 
-    monkeypatch.setattr(eval.predict, "onboard", noted)
-    monkeypatch.setattr(eval.predict, "read_reference_frames", _reference_frames)
+    monkeypatch.setattr(eval.scene_models, "onboard", noted)
+    monkeypatch.setattr(eval.scene_models, "read_reference_frames", _reference_frames)
     vocabularies = read_vocabulary("real275")
     track_scene(NocsDataset(nocs), 1, Protocol(attributes, TrackerConfig(), views=1, vocabularies=vocabularies))
     assert asked == {CAN: vocabularies.for_object("can").labels, MUG: vocabularies.for_object("mug").labels}

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from eval.datasets.synthetic import SyntheticDataset, open_synthetic
-from eval.predict import Protocol, Tracked, track_dataset
+from eval.predict import track_dataset
+from eval.protocol import Protocol
 from eval.score import TrackingCounts
+from eval.tracked import Tracked
 from tracker.concept import ConceptModel
 from tracker.config import TrackerConfig
 from tracker.errors import ConfigError, FrameError, SourceError

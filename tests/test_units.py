@@ -19,9 +19,9 @@ import eval.track_run
 import eval.units
 from eval.bop_results import Estimate, read_results
 from eval.kept_units import ESTIMATES, UNIT, KeptUnits
-from eval.predict import Tracked
 from eval.spread import Spreading, spread
 from eval.track_run import TrackRun, fingerprint_of, opened_backend
+from eval.tracked import Tracked
 from eval.units import Unit, track_units, units_of
 from reference.vocabulary import Vocabulary, VocabularySet
 from tests.tiny_bop import write_bop

@@ -76,9 +76,9 @@ class Pairs:
         from eval.pairs.output import write_answers, write_result_files
         from eval.pairs.pair_lists import write_pairs
         from eval.peers import method_kind
-        from eval.predict import Tracked
         from eval.report import make_report, write_scores
         from eval.score_tables import tables
+        from eval.tracked import Tracked
         from reference.vocabulary import read_vocabulary
         from tracker.config import dump_config, read_config
         from tracker.output import result_folder

@@ -98,12 +98,12 @@ class Track:
         from eval.html_report import write_html
         from eval.markdown_report import write_markdown
         from eval.peers import method_kind
-        from eval.predict import Tracked
         from eval.report import make_report, write_scores
         from eval.score import score
         from eval.score_tables import tables
         from eval.spread import Spreading
         from eval.track_run import opened_dataset
+        from eval.tracked import Tracked
         from eval.units import track_units, units_of
         from tracker.config import dump_config
         from tracker.errors import ConfigError

@@ -14,9 +14,9 @@ from eval.bop_results import Estimate, write_results
 from eval.calibration.rows import write_poses
 from eval.frame_record import FrameRecord
 from eval.kept_units import KeptUnits
-from eval.predict import Tracked
 from eval.summary import TrackingCounts
 from eval.track_run import fingerprint_of
+from eval.tracked import Tracked
 from reference.vocabulary import Vocabulary, VocabularySet, write_vocabulary
 from tests import ros_bags, test_nocs, test_tum, test_ycb_video
 from tests.conftest import draw_globe
