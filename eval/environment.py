@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import re
+import sys
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -28,12 +29,13 @@ def package_versions() -> dict[str, str]:
 
 
 def processor() -> str:
-    """Its name and how many cores of it there are to be had; its architecture where the system tells no name."""
+    """Its name, or its architecture where the system tells no name, and how many of its cores this process may use."""
     name = platform.processor() or platform.machine()
     if CPUINFO.is_file():  # Linux, where Python tells the architecture alone
         named = re.search(r"^model name\s*:\s*(.+)$", CPUINFO.read_text(), re.MULTILINE)
         name = named[1] if named else name
-    return f"{name}, {os.cpu_count()} cores"
+    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()
+    return f"{name}, {cores} cores"
 
 
 def environment() -> dict[str, str]:

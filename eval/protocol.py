@@ -12,6 +12,8 @@ from tracker.config import TrackerConfig
 from tracker.errors import ConfigError
 from tracker.saliency import SaliencyBackend
 
+PosesThatCount = Literal["filtered", "raw"]
+
 
 @dataclass(frozen=True, slots=True)
 class Protocol:
@@ -30,7 +32,7 @@ class Protocol:
     backend: SaliencyBackend
     config: TrackerConfig
     views: int
-    poses: Literal["filtered", "raw"] = "filtered"
+    poses: PosesThatCount = "filtered"
     vocabularies: VocabularySet | None = None
     method: str = "ours"
     initialisation: Literal["estimated", "gt"] = "estimated"

@@ -21,7 +21,8 @@ log = logging.getLogger(__name__)
 def scene_models(
     dataset: Dataset, scene_id: int, object_ids: Sequence[str], protocol: Protocol, tracked: Tracked
 ) -> list[ConceptModel]:
-    """Models of the objects of which one can be made; the others are noted in `tracked.refused`."""
+    """Models of the objects of which one can be made, their reference frames noted in `tracked.reference_frames`; the
+    others with the reason in `tracked.refused`."""
     models = []
     source = dataset.scene(scene_id, protocol.masks)
     make = _unposed if protocol.unposed else _posed

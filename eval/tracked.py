@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from eval.bop_results import Estimate
 from eval.datasets import Dataset
 from eval.frame_record import FrameRecord
 from eval.instances import ObjectInImage
+from eval.protocol import PosesThatCount
 from eval.summary import TrackingCounts
 from tracker.result import TrackResult, TrackState
 
@@ -50,7 +50,7 @@ class Tracked:
         index: int,
         results: Sequence[TrackResult],
         seen: Sequence[bool],
-        poses: Literal["filtered", "raw"],
+        poses: PosesThatCount,
     ) -> None:
         """What was said of a frame. seen: of each object, whether a pixel of it can be seen. poses: which count."""
         image_id = dataset.image_ids(scene_id)[index]

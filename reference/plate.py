@@ -1,4 +1,4 @@
-"""A picture of what the concepts saw: for every reference view its crop, and a tile a concept."""
+"""A picture of what the concepts saw: for every reference view its crop and a tile a concept, with the scale."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_COLUMNS = 10
 
 
 def write_concept_plate(path: Path, model: ConceptModel, backend: SaliencyBackend) -> None:
-    """Write a PNG of the model's reference views. Raises OutputError where it cannot be written."""
+    """Write a PNG of the model's reference views and the scale. Raises OutputError where it cannot be written."""
     plates = [_plate(view, model, backend) for view in model.references]
     plates += [_scale()] if plates else []
     width = max((plate.shape[1] for plate in plates), default=1)

@@ -15,6 +15,7 @@ from tracker.frame_by_frame import FrameByFrame
 from tracker.geometry import Pose
 from tracker.output import PoseOutput
 from tracker.pipeline import ObjectTracker
+from tracker.pointing import Click
 from tracker.remote_control import RemoteControl
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import SaliencyBackend
@@ -28,10 +29,12 @@ class Kept:
         self.shown: list[int] = []
         self.written: list[int] = []
         self.states: list[TrackState] = []
+        self.masked: list[bool] = []
 
     def show(self, frame: Frame, results: Sequence[TrackResult], truth: Mapping[str, Pose]) -> None:
         assert not truth
         self.shown.append(frame.index)
+        self.masked.append(bool(frame.masks))
         self.states.extend(result.state for result in results)
 
     def close(self) -> None:
@@ -57,7 +60,7 @@ def kept() -> Kept:
 
 @pytest.fixture
 def loop(can_model: ConceptModel, attributes: SaliencyBackend, kept: Kept) -> Loop:
-    def made(*, carried: bool = False, smooth: str = "off") -> FrameByFrame:
+    def made(*, carried: bool = False, smooth: str = "off", recorded: bool = False) -> FrameByFrame:
         config = TrackerConfig(masks="carried" if carried else "given")
         return FrameByFrame(
             ObjectTracker(can_model, config, attributes),
@@ -66,7 +69,7 @@ def loop(can_model: ConceptModel, attributes: SaliencyBackend, kept: Kept) -> Lo
             [PoseOutput([kept], smooth)],
             RemoteControl(),
             Summary(),
-            latency_ms=lambda: 12.0,
+            latency_ms=None if recorded else lambda: 12.0,
             page=None,
         )
 
@@ -75,14 +78,33 @@ def loop(can_model: ConceptModel, attributes: SaliencyBackend, kept: Kept) -> Lo
 
 @pytest.mark.parametrize("carried", [False, True])
 def test_every_frame_is_tracked_shown_and_written(
-    carried: bool, loop: Loop, kept: Kept, can_frames: list[Frame]
+    carried: bool, loop: Loop, kept: Kept, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    follow, frames = loop(carried=carried), can_frames[:4]
+    follow, frames, masked = loop(carried=carried), can_frames[:4], []
+    step = ObjectTracker.step
+
+    def stepped(tracker: ObjectTracker, frame: Frame) -> tuple[TrackResult, ...]:
+        masked.append(bool(frame.masks))
+        return step(tracker, frame)
+
+    monkeypatch.setattr(ObjectTracker, "step", stepped)
     assert follow(frames, kept=True) is None
+    assert masked == [True, not carried, not carried, not carried]
+    assert all(kept.masked)
     assert kept.shown == kept.written == [frame.index for frame in frames]
     assert set(kept.states) == {TrackState.TRACKING}
     assert follow.summary.latencies_ms == [12.0] * 4
     assert follow.summary.now() == "1 tracking"
+
+
+def test_of_a_recording_no_latency_is_kept_and_what_is_pointed_out_meanwhile_is_carried_out(
+    loop: Loop, can_frames: list[Frame]
+) -> None:
+    follow = loop(recorded=True, carried=True)
+    told = follow.remote.point_out("soup_can", Click(10**6, 0))
+    assert follow(can_frames[:2], kept=True) is None
+    assert told.done()
+    assert follow.summary.latencies_ms == []
 
 
 @pytest.mark.parametrize("smooth", ["off", "offline"])

@@ -17,7 +17,7 @@ from tracker.looking import Looking
 from tracker.refinement import Refined
 from tracker.rest import Resting
 from tracker.saliency import Query, SaliencyBackend
-from tracker.search import Hypothesis, Search
+from tracker.search import Hypothesis, Search, Sight
 from tracker.sources.synthetic import SyntheticScene
 from tracker.stopwatch import Stopwatch
 from tracker.verification import Evidence
@@ -186,9 +186,13 @@ def test_what_is_turned_otherwise_and_fits_as_well_is_remembered_until_it_is_tri
 
 
 def test_every_turn_is_tried_where_somebody_says_that_it_is_there_and_while_it_has_rivals(
-    can_looking: Counted, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+    can_model: ConceptModel,
+    attributes: SaliencyBackend,
+    can_frames: list[Frame],
+    can_truth: Pose,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked: list[bool] = []
+    can_looking, asked = Counted(can_model, attributes, TrackerConfig(concepts_every=1)), []
 
     def turned(*_: object, every: bool) -> list[Hypothesis]:
         asked.append(every)
@@ -197,10 +201,44 @@ def test_every_turn_is_tried_where_somebody_says_that_it_is_there_and_while_it_h
     monkeypatch.setattr(Search, "turned", turned)
     mask, looking = can_frames[0].masks[CAN], can_looking.looking
     nobody, somebody = Look(mask, None, masked=True), Look(mask, None, masked=True, told=True)
-    for look, told_apart in ((nobody, 1.0), (somebody, 1.0), (nobody, 0.4)):
+    near = Look(mask, can_truth, (can_truth,), masked=True, told=True)
+    for look, told_apart in ((nobody, 1.0), (somebody, 1.0), (near, 1.0), (nobody, 0.4)):
         looking.told_apart = told_apart
         can_looking([look], can_frames[0])
-    assert asked == [False, True, True]
+    assert asked == [False, True, False, True]
+
+
+def test_what_it_may_be_taken_for_is_forgotten_where_it_is_lost(can_looking: Counted) -> None:
+    for forget in (can_looking.looking.forget, lambda: can_looking.looking.came_of_it(None)):
+        can_looking.looking.told_apart = 0.4
+        forget()
+        assert can_looking.looking.told_apart == 1.0
+
+
+@pytest.mark.parametrize(("worse", "is_kept"), [(0.0, True), (0.2, False)])
+def test_what_is_found_from_scratch_is_refined_to_the_end_unless_that_explains_clearly_less(
+    worse: float,
+    is_kept: bool,
+    can_looking: Counted,
+    can_frames: list[Frame],
+    can_truth: Pose,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    settled, seen = Search.settled, []
+
+    def told(search: Search, hypothesis: Hypothesis, sight: Sight, clock: Stopwatch) -> Hypothesis | None:
+        found = settled(search, hypothesis, sight, clock)
+        assert found is not None
+        seen.append(replace(found, evidence=replace(found.evidence, score=found.evidence.score - worse)))
+        return seen[-1]
+
+    monkeypatch.setattr(Search, "settled", told)
+    mask = can_frames[0].masks[CAN]
+    found = can_looking([Look(mask, None, masked=True)], can_frames[0])
+    assert isinstance(found, Found)
+    assert (found.hypothesis is seen[0]) == is_kept
+    can_looking([Look(mask, can_truth, (can_truth,), masked=True)], can_frames[0])
+    assert len(seen) == 1  # what is followed goes on in the next frame
 
 
 def test_what_is_far_from_where_it_was_expected_is_less_likely(

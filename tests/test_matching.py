@@ -248,9 +248,15 @@ def test_matching_by_binary_maps_forgets_how_strong_a_concept_is() -> None:
 
 @given(SEEDS, st.integers(3, 60))
 def test_of_a_few_points_each_is_matched_as_it_is_among_all(seed: int, most: int) -> None:
-    matcher, cloud = Matcher(model_with(maps(seed, 40)), MatchingConfig(), CPU), cloud_with(maps(seed + 1, 50))
+    model, cloud = model_with(maps(seed, 40)), cloud_with(maps(seed + 1, 50))
+    matcher = Matcher(model, MatchingConfig(), CPU)
     few, every = matcher(cloud, most), matcher(cloud)
     assert len(few) == min(most, 50)
     assert few.query_index[0] == 0
     assert few.query_index[-1] == 49
     assert few.model_index.tolist() == every.model_index[few.query_index].tolist()
+
+
+def test_no_more_points_are_matched_than_the_configuration_allows() -> None:
+    matcher, cloud = Matcher(model_with(maps(0, 40)), MatchingConfig(query_points=50), CPU), cloud_with(maps(1, 90))
+    assert len(matcher(cloud, 80)) == len(matcher(cloud)) == 50

@@ -247,16 +247,6 @@ def test_a_true_pose_is_told_once_in_the_first_frame_that_shows_the_object_or_ne
         assert np.array_equal(T_cam_obj.matrix, small_scene().sightings(BOX)[2].T_cam_obj.matrix)
 
 
-def test_a_method_that_goes_on_from_a_pose_is_refused_without_one(protocol: Protocol) -> None:
-    for method in ("icp", "colored-icp"):
-        with pytest.raises(ConfigError, match=f"method {method} .* needs --init gt"):
-            replace(protocol, method=method)
-    with pytest.raises(ConfigError, match="--init gt needs --prior on"):
-        replace(protocol, config=TrackerConfig(prior=False), initialisation="gt")
-    with pytest.raises(ConfigError, match="no method 'best'"):
-        replace(protocol, method="best")
-
-
 def test_a_peer_is_tracked_as_the_tracker_is(protocol: Protocol) -> None:
     tracked = track_dataset(open_synthetic(SMALL), replace(protocol, method="icp", initialisation="gt"))
     assert [e.image_id for e in tracked.estimates] == list(range(6))
@@ -317,18 +307,6 @@ def test_progress_is_told_how_many_frames_there_are(protocol: Protocol) -> None:
 def test_a_scene_that_is_not_there_is_an_error(protocol: Protocol) -> None:
     with pytest.raises(SourceError, match="no scene 3; it has 1"):
         track_dataset(open_synthetic(SMALL), protocol, scene_ids=[3])
-
-
-def test_latency_is_the_median_of_whole_steps_and_of_stages_where_they_ran() -> None:
-    timings = [{"total": float(k), "matching": 2.0 * k} for k in range(1, 101)]
-    timings[6]["registration"], timings[7]["registration"] = 30.0, 50.0
-    latency = Tracked(timings_ms=timings).latency_ms()
-    assert latency == {
-        "median": 50.5,
-        "p95": pytest.approx(95.05),
-        "stages": {"matching": 101.0, "registration": 40.0},
-    }
-    assert Tracked().latency_ms() == {}
 
 
 @dataclass

@@ -8,14 +8,12 @@ import shutil
 import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rich.console import Console
 
-from eval.environment import environment, processor
 from eval.frame_record import FrameRecord
 from eval.html_report import write_html
 from eval.html_tables import html_table
@@ -322,29 +320,3 @@ def test_the_tables_fit_a_terminal_of_eighty_columns(which: int) -> None:
     (line,) = [line for line in captured.get().splitlines() if line.strip().startswith("pooled")]
     columns = TABLES[which][1]
     assert NUMBERS.findall(line) == [f"{SCORES.pooled[name]:.{digits}f}" for name, (_, digits) in columns.items()]
-
-
-def test_the_environment_is_told_by_versions() -> None:
-    told = environment()
-    assert told["python"].startswith("3.")
-    assert told["numpy"] == version("numpy")
-    assert {"machine", "torch", "scipy", "open3d", "small_gicp", "filterpy"} <= set(told)
-
-
-@pytest.mark.parametrize(
-    ("cpuinfo", "name"),
-    [
-        ("processor\t: 0\nmodel name\t: AMD EPYC 9\nflags\t: fpu\n", "AMD EPYC 9"),
-        ("Serial\t: 7\n", "riscv64"),
-        (None, "riscv64"),
-    ],
-)
-def test_the_processor_is_told_by_its_name_where_the_system_has_one(
-    cpuinfo: str | None, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if cpuinfo is not None:
-        (tmp_path / "cpuinfo").write_text(cpuinfo)
-    monkeypatch.setattr("eval.environment.CPUINFO", tmp_path / "cpuinfo")
-    monkeypatch.setattr("platform.processor", lambda: "")
-    monkeypatch.setattr("platform.machine", lambda: "riscv64")
-    assert processor().startswith(f"{name}, ")

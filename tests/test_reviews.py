@@ -20,6 +20,7 @@ from tracker.pointing import Click
 from tracker.result import TrackResult, TrackState
 from tracker.saliency import Query, Saliency
 from tracker.saliency.attributes import Attributes
+from tracker.search import Hypothesis, Search
 from tracker.sources.synthetic import SyntheticScene
 
 CAN = "soup_can"
@@ -103,6 +104,25 @@ def test_what_fits_otherwise_lowers_the_confidence_once_it_is_known(
     assert said[1].grounds.told_apart == 1.0
     assert said[-1].grounds is not None
     assert said[-1].grounds.told_apart == 0.4
+
+
+def test_every_turn_is_tried_later_too_while_it_has_rivals(
+    can_model: ConceptModel, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    worker, asked = Later(), []
+
+    def turned(*_: object, every: bool) -> list[Hypothesis]:
+        asked.append(every)
+        return []
+
+    monkeypatch.setattr(Search, "turned", turned)
+    monkeypatch.setattr("tracker.looking.told_apart", lambda *_: 0.4)
+    tracker = ObjectTracker(can_model, TrackerConfig(concepts_every=1), worker=worker)
+    for frame in can_frames[:4]:
+        tracker.step(frame)
+        worker.work()
+    assert asked[0]  # of a search
+    assert asked[-1]
 
 
 def test_a_wrong_pose_is_put_right_by_what_is_known_later(

@@ -49,8 +49,8 @@ class Found:
     are known to be the object's. jumped: it was looked for in any pose, and is not in one that was expected. missed:
     why it did not even show at the first place where it was looked for; empty where something did. saliency: what
     concepts said there, None where surface and colours were enough. usual: how it looked while it was followed, None
-    where it was not. told_apart: in [0, 1], how surely it is told from what is turned otherwise, None where none of
-    that was tried."""
+    where it was not. told_apart: in [0, 1], how surely it is told from what is turned otherwise, None where
+    surface and colours were enough: then hardly anything else was tried."""
 
     hypothesis: Hypothesis
     grounds: Grounds

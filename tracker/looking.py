@@ -24,7 +24,7 @@ from tracker.search import Hypothesis, Search, Sight
 from tracker.stopwatch import Stopwatch
 from tracker.view import ObjectView, view_object
 
-MOST_TRIED = 64  # poses that are remembered
+MOST_TRIED = 256  # poses that are remembered: more than one frame leads to
 REMEMBERED = 30  # frames in which it was followed: a second of a usual camera
 STEADY_RAD = 0.15  # a pose farther than this from the expected one is a surprise
 ASKED_LATELY = 3  # frames: what concepts could not explain they cannot in the next ones
@@ -70,6 +70,7 @@ class Looking:
     def came_of_it(self, found: Found | None) -> None:
         """What was believed, None where the object is lost: next time every place is looked at then."""
         self._usual = 1.0 if found is None else found.score
+        self.told_apart = 1.0 if found is None else self.told_apart
         if found is not None:
             self.tells_apart(found)
             evidence, usual = found.hypothesis.evidence, found.usual
@@ -82,8 +83,9 @@ class Looking:
             self.told_apart = found.told_apart
 
     def forget(self) -> None:
-        """How it usually looked."""
+        """How it usually looked, and what it may be taken for."""
         self._looked.clear()
+        self.told_apart = 1.0
 
     def concepts_asked(self) -> None:
         """And answered."""
@@ -152,10 +154,15 @@ class Looking:
         # What is turned wrongly at first is followed so, and what had rivals may have them still.
         every = (look.told and best.hypothesis.anywhere) or self.told_apart < self._config.sure
         best = self._likeliest(best, self._search.turned(best.hypothesis, sight, clock, every=every), look) or best
-        if best.hypothesis.anywhere:
-            settled = self._search.settled(best.hypothesis, sight, clock)
-            best = self._found(settled, look) if settled else best
-        return replace(best, saliency=saliency)
+        return replace(self._settled(best, sight, look, clock), saliency=saliency)
+
+    def _settled(self, found: Found, sight: Sight, look: Look, clock: Stopwatch) -> Found:
+        """The same, refined to the end where it was found from scratch, unless the picture denies where that leads."""
+        hypothesis = self._search.settled(found.hypothesis, sight, clock) if found.hypothesis.anywhere else None
+        if hypothesis is None:
+            return found
+        settled = self._found(hypothesis, look)
+        return found if settled.explains < found.explains - CLEARLY_MORE else settled
 
     def _likeliest(self, best: Found | None, hypotheses: Iterable[Hypothesis], look: Look) -> Found | None:
         """The first of those that are most likely."""

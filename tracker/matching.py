@@ -84,9 +84,9 @@ class Matcher:
         self._distinctness = self._look_alikes(model, log_model)
 
     def __call__(self, cloud: PointCloud, most: int | None = None) -> Correspondences:
-        """Of the configured number of the cloud's points, or of `most` of them, spread evenly over it."""
+        """Of the configured number of the cloud's points, or of `most` where that is less, spread evenly over it."""
         config = self._config
-        points = min(len(cloud), most or config.query_points)
+        points = min(len(cloud), config.query_points if most is None else min(most, config.query_points))
         chosen = np.linspace(0, len(cloud) - 1, points).round().astype(np.intp)
         query = encode_query(self._vectors(cloud.saliency[chosen]), config.measure)
         per_point = min(config.per_point, self._model.shape[1])

@@ -113,7 +113,8 @@ class Places:
     def found(self, refined: Refined, now: Moment) -> None:
         """In this frame."""
         self._where.found(refined.T_cam_obj, now.camera)
-        if refined.aligned and self._config.prior:  # of what only stood still nothing new is known
+        # Of what only stood still nothing new is known, and without a prior nothing is held.
+        if refined.aligned and self._config.prior:
             self._rest.found(refined, now.camera)
 
     def not_found(self, now: Moment, suspected: Pose | None = None) -> None:

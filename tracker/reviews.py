@@ -39,10 +39,12 @@ class SecondLook:
         self._look = Looking(model, config.model_copy(update={"concepts_every": 1}))
 
     def __call__(
-        self, looks: Iterable[Look | str], places: Places | None, now: Moment, followed: bool
+        self, looks: Iterable[Look | str], places: Places | None, now: Moment, followed: bool, told_apart: float
     ) -> Asking[Found | None]:
-        """What is believed of what the looks find, or, where that is nothing, a search of the places; or None."""
+        """What is believed of what the looks find, or, where that is nothing, a search of the places; or None.
+        told_apart: how surely what is believed is told from what is turned otherwise, as far as is known."""
         self._look.tried.clear()
+        self._look.told_apart = told_apart
         # Where it stood can be asked in its own frame alone.
         by_itself = [look if isinstance(look, str) else replace(look, rest=None) for look in looks]
         found = yield from self._look.best(by_itself, now.frame, now.clock)

@@ -28,7 +28,8 @@ from tracker.verification import Evidence, Verifier
 from tracker.view import ObjectView, view_object
 
 NEARLY_AS_GOOD = 0.75  # before refinement a turned pose explains less than it will
-TURNED, NEIGHBOUR_RAD = 2, 1.5 * 2 * np.pi / TURNS  # refined at most, none of them next to another
+# Refined at most, none of them next to another, unless every one is asked for.
+TURNED, NEIGHBOUR_RAD = 2, 1.5 * 2 * np.pi / TURNS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,10 +166,10 @@ class Search:
         turns = self._turns.of(hypothesis.refined.T_cam_obj)
         with clock("verification"):
             own, *worth = self._roughly([hypothesis.refined.T_cam_obj, *turns], sight)
-        likely = [turns[k] for k in np.argsort(worth)[::-1] if worth[k] > NEARLY_AS_GOOD * own]
-        chosen = likely if every else []
-        for pose in likely:
-            if len(chosen) < TURNED and all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen):
+        chosen: list[Pose] = []
+        for pose in (turns[k] for k in np.argsort(worth)[::-1] if worth[k] > NEARLY_AS_GOOD * own):
+            apart = all(pose.angle_to_rad(other) > NEIGHBOUR_RAD for other in chosen)
+            if every or (len(chosen) < TURNED and apart):
                 chosen.append(pose)
         found = [turned for pose in chosen if (turned := self._refined(pose, sight, "turn", clock))]
         there = hypothesis.refined.T_cam_obj

@@ -109,12 +109,13 @@ class Track:
         if not self._look.waiting:
             return None
         self._second_look = self._second_look or SecondLook(self._model, self._config)
-        again = self._second_look(self._looked, self._places if self._searched else None, now, self._trusted)
+        places = self._places if self._searched else None
+        again = self._second_look(self._looked, places, now, self._trusted, self._look.told_apart)
         return Review(again, self._raw, now.camera.now, self._forgotten)
 
     def reviewed(self, review: Review, found: Found, camera: CameraMotion) -> None:
-        """What was found of it in the frame of a review says where it is now: where it has been followed since then,
-        its motion is known."""
+        """What was found of it in the frame of a review says where it is now, as where it has been followed since then
+        its motion is known; and how surely it is told from what is turned otherwise."""
         T_then_obj = found.hypothesis.refined.T_cam_obj
         if review.forgotten != self._forgotten:
             return

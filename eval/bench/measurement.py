@@ -14,7 +14,7 @@ from rich.table import Table
 from tracker.terminal import STDERR, hush
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Measurement(ABC):
     """A command that prints its figures as a table and writes them as JSON, with what they were measured on."""
 
@@ -55,8 +55,9 @@ class Measurement(ABC):
             yield name, text_of(value)
 
 
-def text_of(value: object) -> str:
-    """A line a figure of a mapping; of one in it, all in one line."""
+def text_of(value: object, between: str = "\n") -> str:
+    """A line a figure of a mapping; what is in those, in one line. between: the figures."""
     if isinstance(value, dict):
-        return "\n".join(f"{k}: {text_of(v)}" for k, v in value.items()).replace("\n  ", ", ")
+        figures = (f"({text_of(v, ', ')})" if isinstance(v, dict) else text_of(v) for v in value.values())
+        return between.join(f"{k}: {figure}" for k, figure in zip(value, figures, strict=True))
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -41,15 +41,17 @@ class SoakBench(Measurement):
         return f"{self.frames} frames, {self.objects} objects"
 
     def measured(self) -> dict[str, Any]:
+        from tracker.errors import ConfigError
+
+        if self.frames < 2 * self.settled or self.settled < 1:
+            raise ConfigError(f"--frames: at least twice the {self.settled} settled ones are needed, got {self.frames}")
+
         from reference.onboard import onboard, read_reference_frames
         from tracker.config import TrackerConfig
-        from tracker.errors import ConfigError
         from tracker.pipeline import ObjectTracker
         from tracker.saliency import open_backend
         from tracker.sources.synthetic import open_scene
 
-        if self.frames < 2 * self.settled or self.settled < 1:
-            raise ConfigError(f"--frames: at least twice the {self.settled} settled ones are needed, got {self.frames}")
         scene, backend = open_scene(f"{SCENE}?frames={RENDERED}&size={self.size}"), open_backend("attributes")
         object_ids = scene.object_ids[: self.objects]
         models = [onboard(read_reference_frames(scene, object_id, VIEWS), backend) for object_id in object_ids]

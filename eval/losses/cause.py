@@ -89,7 +89,9 @@ class Tracer:
         view = view_object(frame, mask, self._model.diameter_m, self._config.view)
         if view is None:
             return "little seen"
-        at_truth = self._search.continued(truth, Sight.of(view, masked=True), Stopwatch())
+        sight = Sight.of(view, masked=True)
+        at_truth = self._search.continued(truth, sight, Stopwatch())
+        at_truth = at_truth and self._search.settled(at_truth, sight, Stopwatch())  # as what is found from scratch is
         if at_truth is None:
             return "little seen"
         if at_truth.evidence.explained < KNOWN:
