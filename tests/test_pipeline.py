@@ -434,3 +434,16 @@ def test_what_the_concepts_were_asked_of_last_is_kept(can_model: ConceptModel, c
         asked.append(view.frame.index)
     assert 1 < len(set(asked)) < 8
     assert tracker.last_answer("mug") is None
+
+
+@pytest.mark.parametrize("prior", [True, False])
+def test_frames_are_kept_to_hold_a_pose_by_where_there_is_a_prior_alone(
+    prior: bool, can_model: ConceptModel, can_frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept: list[Pose] = []
+    monkeypatch.setattr("tracker.rest.Rest.found", lambda _, refined, camera: kept.append(refined.T_cam_obj))  # noqa: ARG005
+    tracker = ObjectTracker(can_model, TrackerConfig(prior=prior))
+    for frame in can_frames[:3]:
+        (result,) = tracker.step(frame)
+        assert result.pose is not None
+    assert len(kept) == (3 if prior else 0)
