@@ -49,13 +49,9 @@ def _plate(frame: PosedFrame, model: ConceptModel, backend: SaliencyBackend) -> 
 def _heated(crop: Picture, saliency: Float32s) -> Picture:
     """The crop in faint gray, under the map from dark to bright; in every tile bright is the same value, 1."""
     gray = cv2.cvtColor(crop, cv2.COLOR_RGB2GRAY)[:, :, None]
-    return (0.3 * gray + 0.7 * _heat(saliency)).astype(np.uint8)
-
-
-def _heat(saliency: Float32s) -> Picture:
-    """(h, w) in [0, 1] -> its colours, even for colour-blind readers."""
     levels = np.rint(np.clip(saliency, 0, 1) * 255).astype(np.uint8)
-    return np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)[:, :, ::-1], np.uint8)
+    heat = cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)[:, :, ::-1]  # even for colour-blind readers
+    return (0.3 * gray + 0.7 * heat).astype(np.uint8)
 
 
 def _scale() -> Picture:

@@ -55,6 +55,11 @@ def can_looking(can_model: ConceptModel, attributes: SaliencyBackend) -> Counted
     return Counted(can_model, attributes, TrackerConfig(concepts_every=4))
 
 
+@pytest.fixture
+def always_asking(can_model: ConceptModel, attributes: SaliencyBackend) -> Counted:
+    return Counted(can_model, attributes, TrackerConfig(concepts_every=1))
+
+
 def assert_at(found: Found | str, truth: Pose) -> None:
     assert isinstance(found, Found), found
     pose = found.hypothesis.refined.T_cam_obj
@@ -186,25 +191,21 @@ def test_what_is_turned_otherwise_and_fits_as_well_is_remembered_until_it_is_tri
 
 
 def test_every_turn_is_tried_where_somebody_says_that_it_is_there_and_while_it_has_rivals(
-    can_model: ConceptModel,
-    attributes: SaliencyBackend,
-    can_frames: list[Frame],
-    can_truth: Pose,
-    monkeypatch: pytest.MonkeyPatch,
+    always_asking: Counted, can_frames: list[Frame], can_truth: Pose, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    can_looking, asked = Counted(can_model, attributes, TrackerConfig(concepts_every=1)), []
+    asked: list[bool] = []
 
     def turned(*_: object, every: bool) -> list[Hypothesis]:
         asked.append(every)
         return []
 
     monkeypatch.setattr(Search, "turned", turned)
-    mask, looking = can_frames[0].masks[CAN], can_looking.looking
+    mask, looking = can_frames[0].masks[CAN], always_asking.looking
     nobody, somebody = Look(mask, None, masked=True), Look(mask, None, masked=True, told=True)
     near = Look(mask, can_truth, (can_truth,), masked=True, told=True)
     for look, told_apart in ((nobody, 1.0), (somebody, 1.0), (near, 1.0), (nobody, 0.4)):
         looking.told_apart = told_apart
-        can_looking([look], can_frames[0])
+        always_asking([look], can_frames[0])
     assert asked == [False, True, False, True]
 
 
